@@ -18,7 +18,7 @@ pub use sensor::{Sensor, SensorObject, SensorType};
 pub use shape::{Geom, GeomType, HField, Pair, Site};
 pub use view::{Camera, Light, TrackMode};
 
-/// A point or direction in metres (or unit free), `[x, y, z]`.
+/// A point or direction in meters (or unit free), `[x, y, z]`.
 pub type Vec3 = [f64; 3];
 /// A unit quaternion `[w, x, y, z]`.
 pub type Quat = [f64; 4];
@@ -209,13 +209,13 @@ pub struct Body {
     pub pos: Vec3,
     /// Orientation in the parent's frame.
     pub quat: Quat,
-    /// Centre of mass in the body's frame.
+    /// Center of mass in the body's frame.
     pub ipos: Vec3,
     /// Orientation of the principal axes of inertia in the body's frame.
     pub iquat: Quat,
     /// Mass in kg.
     pub mass: f64,
-    /// Principal moments of inertia about the centre of mass, kg m^2, in the frame of `iquat`.
+    /// Principal moments of inertia about the center of mass, kg m^2, in the frame of `iquat`.
     pub inertia: Vec3,
     /// Mass of the subtree rooted here, kg.
     pub subtree_mass: f64,
@@ -368,6 +368,6 @@ pub struct Statistics {
     pub mean_mass: f64,
     /// Size of the model, m; for viewers.
     pub extent: f64,
-    /// Centre of the model, m; for viewers.
+    /// Center of the model, m; for viewers.
     pub center: Vec3,
 }

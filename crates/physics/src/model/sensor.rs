@@ -73,11 +73,11 @@ pub enum SensorType {
     FrameLinAcc,
     /// Angular acceleration of a frame, world axes, 3.
     FrameAngAcc,
-    /// Centre of mass of a body's subtree, 3.
+    /// Center of mass of a body's subtree, 3.
     SubtreeCom,
-    /// Linear velocity of a subtree's centre of mass, 3.
+    /// Linear velocity of a subtree's center of mass, 3.
     SubtreeLinVel,
-    /// Angular momentum of a subtree about its centre of mass, 3.
+    /// Angular momentum of a subtree about its center of mass, 3.
     SubtreeAngMom,
     /// 1 if a frame (`object`) is inside a site (`reference`), else 0.
     InsideSite,

@@ -62,7 +62,7 @@ pub struct Geom {
     pub margin: f64,
     /// Contacts are reported up to margin + gap. Beyond the margin they exert no force.
     pub gap: f64,
-    /// Colour, each in 0..=1.
+    /// Color, each in 0..=1.
     pub rgba: [f32; 4],
     /// Material name, if any; for viewers.
     pub material: Option<String>,
@@ -85,7 +85,7 @@ pub struct Site {
     pub quat: Quat,
     /// Size, see [`GeomType`].
     pub size: Vec3,
-    /// Colour.
+    /// Color.
     pub rgba: [f32; 4],
     /// User group, for viewers.
     pub group: i32,

@@ -10,11 +10,11 @@ pub enum TrackMode {
     Fixed,
     /// Keeps its offset from the body in world axes.
     Track,
-    /// Keeps its offset from the subtree's centre of mass in world axes.
+    /// Keeps its offset from the subtree's center of mass in world axes.
     TrackCom,
     /// Looks at a target body.
     TargetBody,
-    /// Looks at a target's centre of mass.
+    /// Looks at a target's center of mass.
     TargetBodyCom,
 }
 
@@ -50,6 +50,6 @@ pub struct Light {
     pub mode: TrackMode,
     /// Parallel rays.
     pub directional: bool,
-    /// Diffuse colour.
+    /// Diffuse color.
     pub diffuse: [f32; 3],
 }

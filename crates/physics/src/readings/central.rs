@@ -1,7 +1,7 @@
-//! MuJoCo's quantities about centers of mass, and its joint-space forces, in its own conventions: world axes, about the
-//! center of mass of the whole tree that hangs from a child of the world (`subtree_com[body_rootid]`).
+//! MuJoCo's quantities about centers of mass, and its joint-space forces, in MuJoCo's conventions: world axes, about
+//! the center of mass of the whole tree below a child of the world (`subtree_com[body_rootid]`).
 //!
-//! A step does not need them. [`Sim::measure`] computes them from what the last physics step left behind.
+//! A step does not need them. [`Sim::measure`] computes them from the results of the last physics step.
 
 use super::Readings;
 use super::forces::{ContactForce, Wrench};
@@ -13,12 +13,12 @@ use crate::sim::{Mount, Sim, TransmissionSpec};
 use crate::state::{Group, Work};
 
 impl<T: Real> Sim<T> {
-    /// Centers of mass for the frames that `work` has now.
+    /// Centers of mass for the current frames of `work`.
     pub(super) fn measure_centers(&self, work: &mut Work<T>, group: &Group<T>) {
         T::enter(Centers(self, group, work));
     }
 
-    /// Forces on bodies, and the centers of mass that they are about.
+    /// Forces on bodies, and the centers of mass that they refer to.
     pub(super) fn measure_bodies(&self, work: &mut Work<T>, group: &Group<T>) {
         self.measure_centers(work, group);
         T::enter(Wrenches(self, group, work));
@@ -38,7 +38,8 @@ impl<T: Real> Sim<T> {
 
 impl<T: Real> Readings<'_, T> {
     /// Inertia of a body about the center of mass of its tree, world axes: xx, yy, zz, xy, xz, yz (kg m^2), mass times
-    /// the offset of its own center of mass (kg m), mass (kg). With [`MeasurePlan::centers`](super::MeasurePlan::centers).
+    /// the offset of its own center of mass (kg m), mass (kg). With
+    /// [`MeasurePlan::centers`](super::MeasurePlan::centers).
     #[inline(always)]
     pub fn cinert(&self, body: usize) -> [T; 10] {
         let com = &self.sim.coms[body];
@@ -73,8 +74,8 @@ impl<T: Real> Readings<'_, T> {
         [spin[0], spin[1], spin[2], v[0], v[1], v[2]]
     }
 
-    /// What contacts, connect and weld constraints and pushes from outside do to a body: torque about the center of
-    /// mass of its tree (N m), and force (N). Zero for the world. With [`MeasurePlan::bodies`](super::MeasurePlan::bodies).
+    /// External force on a body from contacts, connect and weld constraints and pushes: torque about the center of mass
+    /// of its tree (N m), and force (N). Zero for the world. With [`MeasurePlan::bodies`](super::MeasurePlan::bodies).
     #[inline(always)]
     pub fn cfrc_ext(&self, body: usize) -> V6<T> {
         self.work.readings.cfrc_ext[body]
@@ -100,7 +101,7 @@ impl<T: Real> Readings<'_, T> {
         for (root, body) in bodies.iter().enumerate().skip(1) {
             if body.root_id == root {
                 let center = add3(&self.mount_pos(&self.sim.coms[root]), &self.work.readings.tree_com[root]);
-                // one tree has all of the mass, and then no digit is lost
+                // a single tree has all of the mass, and then no digit is lost
                 let share = T::lit(body.subtree_mass / bodies[0].subtree_mass);
                 for k in 0..3 {
                     sum[k] = center[k].mul_add(share, sum[k]);
@@ -110,7 +111,7 @@ impl<T: Real> Readings<'_, T> {
         sum
     }
 
-    /// From the center of mass of a body's tree to a frame.
+    /// Vector from the center of mass of a body's tree to a frame.
     #[inline(always)]
     fn offset(&self, body: usize, to: &Mount<T::Scalar>) -> V3<T> {
         let root = self.sim.model.bodies[body].root_id;
@@ -131,8 +132,7 @@ impl<T: Real> Readings<'_, T> {
         }
     }
 
-    /// Adds a force, or takes it away, that acts on a body at a distance `arm` from the center of mass of the body that
-    /// its tree hangs from.
+    /// Adds or subtracts a force on a body at the offset `arm` from the center of mass of the body's tree.
     #[inline(always)]
     fn add_wrench(
         &self,
@@ -169,7 +169,7 @@ impl<T: Real> Kernel<T> for Centers<'_, T> {
             if bodies[root].root_id != root {
                 continue;
             }
-            // a tree follows its root without a gap
+            // a tree follows its root without gaps
             let mut end = root + 1;
             while end < bodies.len() && bodies[end].root_id == root {
                 end += 1;

@@ -1,4 +1,4 @@
-//! Contact sensors: how many contacts match, and what they exert together.
+//! Contact sensors: the number of matching contacts, and their total force.
 
 use super::Readings;
 use super::forces::ContactForce;
@@ -7,7 +7,7 @@ use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::model::{Sensor, SensorObject};
 
-/// Fields of the sensor, as bits: number of contacts, force, torque, distance, place, normal, tangent.
+/// Fields of the sensor, as bits: number of contacts, force, torque, distance, position, normal, tangent.
 const FOUND: i32 = 1;
 const KNOWN: i32 = 127;
 const SIZES: [usize; 7] = [1, 3, 3, 1, 3, 3, 3];
@@ -15,8 +15,8 @@ const SIZES: [usize; 7] = [1, 3, 3, 1, 3, 3, 3];
 const NET_FORCE: i32 = 3;
 
 impl<T: Real> Readings<'_, T> {
-    /// Value of a contact sensor. `None` unless it counts contacts alone or sums them: which contact is the first of
-    /// several is not the same as in MuJoCo.
+    /// Value of a contact sensor. `None` unless it only counts contacts or sums them: the order of several contacts
+    /// differs from MuJoCo's.
     #[inline(always)]
     pub(super) fn contact_value(&self, s: &Sensor) -> Option<Vec<T>> {
         let [mask, reduce, _] = s.intprm;
@@ -33,14 +33,14 @@ impl<T: Real> Readings<'_, T> {
         }
         let mut out = vec![z; s.dim];
         if reduce != NET_FORCE {
-            // every slot that a contact fills has their number
+            // every slot of a contact has their number
             for (slot, x) in out.iter_mut().enumerate() {
                 *x = T::masked(T::lit(slot as f64).lt(found), found);
             }
             return Some(out);
         }
 
-        // the place is the mean of all places, weighted with the forces
+        // the position is the mean of all positions, weighted by the forces
         let (mut weight, mut place) = (z, [z; 3]);
         for (c, on, _) in &matches {
             let w = T::masked(*on, dot(&c.force, &c.force).sqrt());
@@ -74,8 +74,8 @@ impl<T: Real> Readings<'_, T> {
         Some(out)
     }
 
-    /// Lanes in which a contact matches the objects of a sensor, and whether its force on the second geom has to be
-    /// turned around.
+    /// Lanes in which a contact matches the objects of a sensor, and whether its force on the second geom must be
+    /// negated.
     #[inline(always)]
     fn contact_match(&self, c: &ContactForce<T>, a: SensorObject, b: SensorObject) -> (T::Mask, bool) {
         let none = SensorObject::None;

@@ -5,7 +5,7 @@ use crate::lanes::Real;
 use crate::model::{Geom, GeomType, Model};
 
 impl Model {
-    /// Geoms that do not move and that one may stand on: planes, then height fields.
+    /// Static geoms that serve as ground: planes, then height fields.
     pub fn grounds(&self) -> Vec<usize> {
         let still = |kind: GeomType| {
             let ground = move |g: &usize| {
@@ -19,10 +19,10 @@ impl Model {
 }
 
 impl<T: Real> Readings<'_, T> {
-    /// Height at (x, y) of a plane, or of a height field that lies level, m, and the lanes in which the geom covers that
-    /// place. Every agent has its own ground; beyond the border of a field, its height is that of the nearest place.
+    /// Height at (x, y) of a plane or a level height field, m, and the lanes in which the geom covers that position.
+    /// Every agent has its own ground. Beyond the border of a field, the height is that of the nearest position.
     ///
-    /// A tilted field is taken for a level one, and a geom of another type for a plane.
+    /// Tilted fields are treated as level, and geoms of other types as planes.
     #[inline(always)]
     pub fn elevation(&self, geom: usize, x: T, y: T) -> (T, T::Mask) {
         let (center, axes) = (self.geom_pos(geom), self.geom_axes(geom));
@@ -43,8 +43,8 @@ impl<T: Real> Readings<'_, T> {
         (height + center[2], T::from_bits(covered))
     }
 
-    /// Height of the ground at (x, y), m, of the model's [`grounds`](Model::grounds): the highest of those that cover the
-    /// place. Beyond all of them, that of the nearest place of the first; 0 if there are none.
+    /// Height of the ground at (x, y), m: the highest of the model's [`grounds`](Model::grounds) that cover the
+    /// position. Beyond all of them, the nearest height of the first one; 0 without grounds.
     #[inline(always)]
     pub fn ground_height(&self, grounds: &[usize], x: T, y: T) -> T {
         let mut height = T::zero();

@@ -5,7 +5,7 @@ use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::model::{JointType, TendonKind};
 
-/// Mass properties and motion of a body together with all bodies below it.
+/// Mass properties and motion of a body with all bodies below it.
 pub(super) struct Subtree<T> {
     pub com: V3<T>,
     /// Velocity of the center of mass.
@@ -25,7 +25,7 @@ impl<T: Real> Readings<'_, T> {
         for b in (body..m.bodies.len()).filter(|b| inside[*b]) {
             total += self.own_mass(b);
         }
-        // nothing is divided by a subtree without mass, as in MuJoCo
+        // as in MuJoCo, a subtree without mass is not divided by
         let inverse = total.max(T::lit(1e-15)).recip();
         let (mut arm, velocity) = ([T::zero(); 3], self.subtree_velocity(body));
         for b in (body..m.bodies.len()).filter(|b| inside[*b]) {
@@ -45,13 +45,13 @@ impl<T: Real> Readings<'_, T> {
         Subtree { com: add3(&self.mount_pos(own), &arm), velocity, momentum }
     }
 
-    /// Velocity of the center of mass of a body and all that hang from it, m/s.
+    /// Velocity of the center of mass of a body and all bodies below it, m/s.
     #[inline(always)]
     pub fn subtree_velocity(&self, body: usize) -> V3<T> {
         let bodies = &self.sim.model.bodies;
         let (mut mass, mut momentum) = (T::zero(), [T::zero(); 3]);
         for b in body..bodies.len() {
-            // what hangs from a body follows it without a gap
+            // the bodies below a body follow it without gaps
             if b > body && bodies[b].parent < body {
                 break;
             }
@@ -65,7 +65,7 @@ impl<T: Real> Readings<'_, T> {
         [momentum[0] * inverse, momentum[1] * inverse, momentum[2] * inverse]
     }
 
-    /// Energy of gravity and springs. A spring whose stiffness is a polynomial of its displacement `x` holds
+    /// Energy of gravity and springs. A spring whose stiffness is a polynomial of its displacement `x` has the energy
     /// `k x^2 / 2 + p0 x^3 / 3 + p1 x^4 / 4`.
     #[inline(always)]
     pub(super) fn potential_energy(&self) -> T {
@@ -116,7 +116,7 @@ impl<T: Real> Readings<'_, T> {
         dot(&v, &v).sqrt()
     }
 
-    /// Energy of motion, that of armatures included.
+    /// Kinetic energy, including that of armatures.
     #[inline(always)]
     pub(super) fn kinetic_energy(&self) -> T {
         let m = &self.sim.model;
@@ -132,7 +132,7 @@ impl<T: Real> Readings<'_, T> {
             for (i, (a, ca)) in terms.iter().enumerate() {
                 for (b, cb) in &terms[..=i] {
                     let (a, b) = (m.joints[*a].dof_adr, m.joints[*b].dof_adr);
-                    // the mass matrix couples a degree of freedom with its ancestors only
+                    // the mass matrix couples a degree of freedom only with its ancestors
                     let weight = match a == b {
                         true => 1.0,
                         false if self.above(a, b) || self.above(b, a) => 2.0,

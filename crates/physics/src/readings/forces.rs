@@ -1,4 +1,4 @@
-//! Forces between bodies at the last physics step: contacts, and what a body's parent exerts on it.
+//! Forces between bodies at the last physics step: contacts, and the force from a body's parent.
 
 use super::Readings;
 use crate::algebra::spatial::*;
@@ -10,9 +10,9 @@ use crate::sim::Mount;
 
 /// A contact in some lanes.
 pub(super) struct ContactForce<T: Real> {
-    /// The force acts on the second geom, and its opposite on the first.
+    /// The force acts on the second geom, its opposite on the first.
     pub geoms: [usize; 2],
-    /// The order of the geoms is MuJoCo's.
+    /// Whether the order of the geoms is MuJoCo's.
     pub natural: bool,
     /// Lanes that have this contact.
     pub on: T::Mask,
@@ -21,15 +21,15 @@ pub(super) struct ContactForce<T: Real> {
     pub point: V3<T>,
     /// Direction towards the second geom.
     pub normal: V3<T>,
-    /// Force along the normal, and all of it in world axes, and the torque about the contact point.
+    /// Force along the normal, the full force in world axes, and the torque about the contact point.
     pub push: T,
     pub force: V3<T>,
     pub torque: V3<T>,
 }
 
-/// What a connect or weld constraint does.
+/// Force of a connect or weld constraint.
 pub(super) struct TieForce<T: Real> {
-    /// The force acts on the second body, and its opposite on the first, each at its own point.
+    /// The force acts on the second body, its opposite on the first, each at its own point.
     pub bodies: [usize; 2],
     pub points: [Mount<T::Scalar>; 2],
     pub force: V3<T>,
@@ -43,7 +43,7 @@ pub(super) struct Wrench<T> {
 }
 
 impl<T: Real> Wrench<T> {
-    /// Adds a force that acts at a distance `arm` from the point, and a torque, in the lanes `on`.
+    /// Adds a force at the offset `arm` from the point, and a torque, in the lanes `on`.
     #[inline(always)]
     pub fn add(&mut self, arm: &V3<T>, force: &V3<T>, torque: &V3<T>, on: T::Mask) {
         let t = cross_add(arm, force, torque);
@@ -53,7 +53,7 @@ impl<T: Real> Wrench<T> {
         }
     }
 
-    /// Takes such a force away.
+    /// Subtracts such a force.
     #[inline(always)]
     pub fn subtract(&mut self, arm: &V3<T>, force: &V3<T>, torque: &V3<T>, on: T::Mask) {
         let (f, t) = ([-force[0], -force[1], -force[2]], [-torque[0], -torque[1], -torque[2]]);
@@ -94,7 +94,7 @@ impl<T: Real> Readings<'_, T> {
         }
     }
 
-    /// A contact of a pair of geoms that a block has in the lanes `on`.
+    /// A contact of a pair of geoms in a block, in the lanes `on`.
     #[inline(always)]
     pub(super) fn pair_contact(&self, block: &Block<T>, index: usize, on: T::Mask) -> Option<ContactForce<T>> {
         let Jacobian::Points { sides, lin: frame, .. } = &block.jacobian else { return None };
@@ -147,9 +147,9 @@ impl<T: Real> Readings<'_, T> {
         out
     }
 
-    /// Force and torque that a site's body receives from its parent, about the site and in its axes: what the motion of
-    /// the body and of all bodies below it needs, less what contacts, connect and weld constraints and pushes from
-    /// outside provide (MuJoCo's `cfrc_int`). `None` for sites of the world, which has no parent.
+    /// Force and torque on a site's body from its parent, about the site and in its axes (MuJoCo's `cfrc_int`). They
+    /// are what the motion of the body and all bodies below it needs, minus the forces of contacts, connect and weld
+    /// constraints and pushes. `None` for sites of the world, which has no parent.
     #[inline(always)]
     pub(super) fn interaction(&self, site: usize) -> Option<(V3<T>, V3<T>)> {
         let m = &self.sim.model;
@@ -189,7 +189,7 @@ impl<T: Real> Readings<'_, T> {
         Some((into_axes(&axes, &sum.force), into_axes(&axes, &sum.torque)))
     }
 
-    /// Force at the center of mass and torque about it that a body's motion and weight need.
+    /// Force at the center of mass, and torque about it, that a body's motion and weight need.
     #[inline(always)]
     fn inertial_force(&self, body: usize) -> (V3<T>, V3<T>) {
         let com = &self.sim.coms[body];
@@ -207,7 +207,7 @@ impl<T: Real> Readings<'_, T> {
         ([a[0] * mass, a[1] * mass, a[2] * mass], rotate(&axes, &torque))
     }
 
-    /// Which bodies belong to a body's subtree.
+    /// Whether each body belongs to a body's subtree.
     #[inline(always)]
     pub(super) fn subtree_of(&self, body: usize) -> Vec<bool> {
         let bodies = &self.sim.model.bodies;

@@ -1,4 +1,4 @@
-//! Frames of bodies, geoms, sites and cameras: where they are relative to each other and how they move.
+//! Frames of bodies, geoms, sites and cameras: their relative poses and motions.
 
 use super::Readings;
 use crate::algebra::spatial::*;
@@ -7,7 +7,7 @@ use crate::model::{JointType, SensorObject, TrackMode};
 use crate::sim::Mount;
 
 impl<T: Real> Readings<'_, T> {
-    /// Where an object sits on its link. `None` for what has no frame, and for cameras that turn by themselves.
+    /// Pose of an object on its link. `None` for objects without a frame, and for cameras that turn by themselves.
     #[inline(always)]
     pub(super) fn mount_of(&self, object: SensorObject) -> Option<Mount<T::Scalar>> {
         match object {
@@ -33,7 +33,8 @@ impl<T: Real> Readings<'_, T> {
         }
     }
 
-    /// From one frame's origin to another's, world axes. Within a tree it does not lose precision far from the origin.
+    /// Vector from one frame's origin to another's, world axes. Within a tree it does not lose precision far from the
+    /// origin.
     #[inline(always)]
     pub(super) fn separation(&self, from: &Mount<T::Scalar>, to: &Mount<T::Scalar>) -> V3<T> {
         match to.link {
@@ -42,7 +43,7 @@ impl<T: Real> Readings<'_, T> {
         }
     }
 
-    /// From a frame's origin to a point that is given relative to the reference point of a tree, or in the world.
+    /// Vector from a frame's origin to a point that is relative to the reference point of a tree, or in the world.
     #[inline(always)]
     pub(super) fn arm_from(&self, from: &Mount<T::Scalar>, tree: Option<usize>, point: &V3<T>) -> V3<T> {
         let (start, start_tree) = match from.link {
@@ -65,8 +66,8 @@ impl<T: Real> Readings<'_, T> {
         into_axes(&self.work.motion.axes(m), v)
     }
 
-    /// Orientation of an object as the product of the quaternions from the root outward, as MuJoCo has it: its sign is
-    /// that of the state's quaternions, not a choice of its own.
+    /// Orientation of an object as the product of the quaternions from the root outward, as in MuJoCo. Its sign follows
+    /// from the state's quaternions.
     #[inline(always)]
     pub(super) fn quat_of(&self, object: SensorObject) -> Option<[T; 4]> {
         let m = &self.sim.model;
@@ -120,12 +121,12 @@ impl<T: Real> Readings<'_, T> {
         normalized(&[q[at], q[at + 1], q[at + 2], q[at + 3]])
     }
 
-    /// Velocity of a frame's origin and its angular velocity, as seen from another frame (which may move and turn).
+    /// Velocity of a frame's origin and its angular velocity, relative to another frame (which may move and turn).
     #[inline(always)]
     pub(super) fn relative_velocity(&self, m: &Mount<T::Scalar>, from: &Mount<T::Scalar>) -> (V3<T>, V3<T>) {
         let turning = self.mount_spin(from);
         let v = sub3(&self.mount_velocity(m), &self.mount_velocity(from));
-        // what the turning of the reference frame makes of a point at rest
+        // velocity of a point at rest due to the rotation of the reference frame
         let v = cross_add(&self.separation(from, m), &turning, &v);
         let w = sub3(&self.mount_spin(m), &turning);
         let axes = self.work.motion.axes(from);

@@ -1,6 +1,6 @@
 //! Joint-space quantities for inspection and tests: bias, passive, actuator and constraint forces, and the mass matrix.
 //!
-//! A step never needs them; they are computed from what the last [`Sim::forward`](crate::sim::Sim::forward) left behind.
+//! A step never needs them. They are computed from the results of the last [`Sim::forward`](crate::sim::Sim::forward).
 
 use super::Readings;
 use crate::algebra::spatial::*;
@@ -14,7 +14,7 @@ impl<T: Real> Readings<'_, T> {
         self.joint_space(self.work.motion.bias_force.clone())
     }
 
-    /// Springs, dampers, actuators, the medium and pushes together (`qfrc_passive + qfrc_actuator` and `xfrc_applied`).
+    /// Total of springs, dampers, actuators, the medium and pushes (`qfrc_passive + qfrc_actuator` and `xfrc_applied`).
     pub fn applied_forces(&self) -> Vec<T> {
         let mut external = self.work.forces.link_applied.clone();
         external.resize(self.sim.links.len(), [T::zero(); 6]);
@@ -39,7 +39,7 @@ impl<T: Real> Readings<'_, T> {
         let nv = self.sim.model.nv;
         let mut rows = Vec::with_capacity(nv);
         for i in 0..nv {
-            // inertial forces of a unit acceleration of one degree of freedom
+            // inertial forces for a unit acceleration of one degree of freedom
             let mut motion = vec![[T::zero(); 6]; self.sim.links.len()];
             let mut forces = motion.clone();
             for (l, link) in self.sim.links.iter().enumerate() {
@@ -57,7 +57,7 @@ impl<T: Real> Readings<'_, T> {
         rows
     }
 
-    /// Forces on links as forces on joints.
+    /// Converts forces on links to forces on joints.
     fn joint_space(&self, mut forces: Vec<V6<T>>) -> Vec<T> {
         let mut out = vec![T::zero(); self.sim.model.nv];
         joint_space(self.sim, self.work, &mut forces, &mut out);
@@ -99,7 +99,7 @@ pub(crate) fn constraint_wrenches<T: Real>(work: &Work<T>, links: &mut [V6<T>], 
     }
 }
 
-/// Adds what forces on links do to the joints: every joint carries all that is above it. The forces are added up on
+/// Adds the effect of forces on links to the joints. Every joint carries everything above it. Accumulates the forces on
 /// the way.
 #[inline(always)]
 pub(crate) fn joint_space<T: Real>(sim: &Sim<T>, work: &Work<T>, links: &mut [V6<T>], joints: &mut [T]) {
@@ -138,7 +138,7 @@ mod tests {
             let bias = readings.qfrc_bias();
             assert_eq!(readings.applied_forces()[0], force);
             assert_eq!(bias[0], 0.0);
-            // positions and velocities alone know nothing of pushes, and the bias is what it was
+            // positions and velocities do not depend on pushes, so the bias stays the same
             sim.refresh(&mut work, group);
             assert_eq!(Readings::new(&sim, group, &work).qfrc_bias(), bias);
         }

@@ -6,7 +6,7 @@ use crate::lanes::Real;
 use crate::model::{JointType, TendonKind, Transmission};
 use crate::rows::Source;
 
-/// A limit that is reached: distance less margin, its rate, the limit's force; zero where no limit is.
+/// An active limit: distance minus margin, its rate, the limit's force. Zero without an active limit.
 #[derive(Clone, Copy)]
 pub(super) struct LimitReading<T> {
     pub pos: T,
@@ -52,7 +52,7 @@ impl<T: Real> Readings<'_, T> {
         };
         let (q, d) = (joint.qpos_adr, joint.dof_adr);
         let rate = |d: usize| [self.group.qvel[d], self.group.qvel[d + 1], self.group.qvel[d + 2]];
-        // a torque in the parent's axes, seen from the body
+        // a torque in the parent's axes, converted to the body's
         let turned = |gear: &V3<T>, q: usize| {
             if in_parent {
                 let r = quat_to_rot(&self.joint_quat(q));
@@ -74,7 +74,7 @@ impl<T: Real> Readings<'_, T> {
         }
     }
 
-    /// Total force of all actuators on a hinge or slide, those that pull its tendons included. `None` where gravity
+    /// Total force of all actuators on a hinge or slide, including those that pull its tendons. `None` if gravity
     /// compensation counts as one of them.
     #[inline(always)]
     pub(super) fn joint_actuator_force(&self, joint: usize) -> Option<T> {
@@ -114,7 +114,7 @@ impl<T: Real> Readings<'_, T> {
         sum
     }
 
-    /// The limit of a joint; the lower one where both are reached. That of a ball joint is for its angle.
+    /// The limit of a joint, the lower one if both are reached. For a ball joint, the limit of its angle.
     #[inline(always)]
     pub(super) fn joint_limit(&self, joint: usize) -> LimitReading<T> {
         let (z, one) = (T::zero(), &self.sim.joints[joint]);
@@ -157,7 +157,7 @@ impl<T: Real> Readings<'_, T> {
         }
     }
 
-    /// The limit of a tendon; the lower one where both are reached.
+    /// The limit of a tendon, the lower one if both are reached.
     #[inline(always)]
     pub(super) fn tendon_limit(&self, tendon: usize) -> LimitReading<T> {
         let z = T::zero();
@@ -172,7 +172,7 @@ impl<T: Real> Readings<'_, T> {
         LimitReading { pos, vel, force: self.limit_force(Source::TendonLimit(tendon)) }
     }
 
-    /// Force of the first row of a limit that a lane has.
+    /// Force of the first row that a limit has in a lane.
     #[inline(always)]
     fn limit_force(&self, source: Source) -> T {
         let mut force = T::zero();
@@ -185,7 +185,7 @@ impl<T: Real> Readings<'_, T> {
     }
 }
 
-/// Distance from the first of two limits that is nearer than the margin, less the margin, and its rate for the
+/// Distance from the first of two limits that is closer than the margin, minus the margin, and its rate for the
 /// coordinate's rate `v`.
 #[inline(always)]
 fn reached<T: Real>(low: T, high: T, margin: T, v: T) -> (T, T) {

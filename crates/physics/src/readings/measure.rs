@@ -1,7 +1,7 @@
-//! Measuring what a step does not need, in one call and in the order that the frames demand.
+//! Measures quantities that a step does not need, in one call and in the order that the frames require.
 //!
-//! Forces act where the frames were when the step computed them, so everything that reads forces comes before the frames
-//! move on to the present state.
+//! Forces belong to the frames from which the step computed them. All force readings therefore come before the frames
+//! are updated to the current state.
 
 use super::Readings;
 use crate::lanes::{Kernel, Real};
@@ -11,18 +11,19 @@ use crate::state::{Group, Work};
 /// What to measure of a group besides positions and velocities.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct MeasurePlan {
-    /// After a step, leave frames and velocities of bodies, geoms and sites as the last physics step had them, as MuJoCo's
-    /// `mj_step` does: of the state before it, or of the last stage of RK4. Else they are those of the present state.
+    /// After a step, keep the frames and velocities of bodies, geoms and sites of the last physics step, as MuJoCo's
+    /// `mj_step` does: those of the state before it, or of the last stage of RK4. Otherwise they are updated to the
+    /// current state.
     pub of_last_step: bool,
     /// [`Readings::cinert`], [`Readings::cvel`] and [`Readings::center_of_mass`].
     pub centers: bool,
-    /// [`Readings::cfrc_ext`] after a step (MuJoCo's `mj_rnePostConstraint`), and what `centers` asks for.
+    /// [`Readings::cfrc_ext`] after a step (MuJoCo's `mj_rnePostConstraint`). Includes `centers`.
     pub bodies: bool,
     /// [`Readings::qfrc_actuator`].
     pub actuators: bool,
-    /// [`Readings::qfrc_constraint`], and what `actuators` asks for.
+    /// [`Readings::qfrc_constraint`]. Includes `actuators`.
     pub joints: bool,
-    /// Sites whose [`Readings::touch_forces`] are wanted.
+    /// Sites for which [`Readings::touch_forces`] is measured.
     pub touch_sites: Vec<usize>,
 }
 
@@ -36,15 +37,15 @@ impl<T: Real> Sim<T> {
         if !plan.of_last_step {
             self.refresh(work, group);
         }
-        // those that forces on bodies are about belong to the last step
+        // the centers for forces on bodies are those of the last step
         let measured = plan.bodies && plan.of_last_step;
         if (plan.centers || plan.bodies) && !measured {
             self.measure_centers(work, group);
         }
     }
 
-    /// Measures a group in a state that no step has led to. The forces are those of this state, and are evaluated only as
-    /// far as the plan needs them. [`Readings::cfrc_ext`] is not measured.
+    /// Measures a group in a state that was not reached by a step. The forces are those of this state, and are only
+    /// evaluated as far as the plan needs them. [`Readings::cfrc_ext`] is not measured.
     pub fn measure_start(&self, work: &mut Work<T>, group: &Group<T>, plan: &MeasurePlan) {
         if plan.joints || !plan.touch_sites.is_empty() {
             self.forward(work, group);
@@ -96,9 +97,9 @@ impl<T: Real> Kernel<T> for TouchForces<'_, T> {
 }
 
 impl<'a, T: Real> Readings<'a, T> {
-    /// What touch sensors feel on the plan's [`touch_sites`](MeasurePlan::touch_sites), N: the normal forces of the
-    /// contacts of the site's body in the site's volume. A contact is felt if the ray from its point against the force on
-    /// the body meets the volume, which one from inside always does.
+    /// Touch sensor forces on the plan's [`touch_sites`](MeasurePlan::touch_sites), N: the normal forces of the
+    /// contacts of the site's body in the site's volume. A contact counts if the ray from its point against the force
+    /// on the body hits the volume. A ray from inside always does.
     #[inline(always)]
     pub fn touch_forces(&self) -> &'a [T] {
         &self.work.readings.touch_forces

@@ -1,6 +1,6 @@
-//! What can be read off a group after a step: poses, velocities, contacts and sensors, in world axes.
+//! Readings of a group after a step: poses, velocities, contacts and sensors, in world axes.
 //!
-//! [`sensors`] evaluates a sensor by its kind; the other files have what it needs.
+//! [`sensors`] evaluates a sensor by its kind. The other files have the quantities it needs.
 
 mod central;
 mod contacts;
@@ -24,10 +24,10 @@ use crate::lanes::Real;
 use crate::sim::{Mount, Sim};
 use crate::state::{Group, Work};
 
-/// A view of the group that was stepped (or refreshed) last with `work`.
+/// A view of the group that was last stepped (or refreshed) with `work`.
 ///
-/// Positions and velocities belong to the present state. Accelerations, contacts and forces belong to the last physics
-/// step, as the dynamics that produced them does. Indices are those of the [`Model`](crate::model::Model).
+/// Positions and velocities belong to the current state. Accelerations, contacts and forces belong to the last physics
+/// step, as do the dynamics that produced them. Indices are those of the [`Model`](crate::model::Model).
 #[derive(Clone, Copy)]
 pub struct Readings<'a, T: Real> {
     /// Constants.
@@ -39,7 +39,7 @@ pub struct Readings<'a, T: Real> {
 }
 
 impl<'a, T: Real> Readings<'a, T> {
-    /// A view; `work` must have been used last for `group`.
+    /// Creates a view. The last use of `work` must have been for `group`.
     #[inline(always)]
     pub fn new(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a Work<T>) -> Self {
         Readings { sim, group, work }
@@ -215,7 +215,8 @@ impl<'a, T: Real> Readings<'a, T> {
         [T::lit(i[0]) * factor, T::lit(i[1]) * factor, T::lit(i[2]) * factor]
     }
 
-    /// Linear (with gravity as an upward acceleration, as an accelerometer feels it) and angular acceleration.
+    /// Linear acceleration (including gravity as an upward acceleration, as an accelerometer measures it) and angular
+    /// acceleration.
     #[inline(always)]
     fn mount_acceleration(&self, m: &Mount<T::Scalar>) -> (V3<T>, V3<T>) {
         let Some(link) = m.link else {

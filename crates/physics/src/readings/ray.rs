@@ -1,4 +1,4 @@
-//! A ray and what it meets: the nearest hit so far, points on the ray, the faces of a box.
+//! A ray and its hits: the nearest hit so far, points on the ray, the faces of a box.
 
 use crate::algebra::spatial::*;
 use crate::lanes::Real;
@@ -6,12 +6,12 @@ use crate::lanes::Real;
 /// Below this a direction or a discriminant counts as zero (MuJoCo's `mjMINVAL`).
 pub(super) const TINY: f64 = 1e-15;
 
-/// Where a ray meets a shape.
+/// The hit of a ray on a shape.
 #[derive(Clone, Copy)]
 pub(super) struct Hit<T> {
-    /// Distance; -1 where the ray meets nothing.
+    /// Distance; -1 without a hit.
     pub dist: T,
-    /// Outward normal of the surface there; zero where there is none.
+    /// Outward normal of the surface there; zero without a hit.
     pub normal: V3<T>,
 }
 
@@ -21,7 +21,7 @@ impl<T: Real> Hit<T> {
         Hit { dist: T::lit(-1.0), normal: [T::zero(); 3] }
     }
 
-    /// Takes a hit at `x` in the lanes `ok`, if it is ahead and nearer than the one at hand.
+    /// Takes a hit at `x` in the lanes `ok`, if it is ahead and closer than the current one.
     #[inline(always)]
     pub fn offer(&mut self, ok: T::Mask, x: T, normal: &V3<T>) {
         let z = T::zero();
@@ -46,7 +46,7 @@ pub(super) fn normalized<T: Real>(v: &V3<T>) -> V3<T> {
     [v[0] * inv, v[1] * inv, v[2] * inv]
 }
 
-/// Face `2 axis` (negative side) or `2 axis + 1` of a box: distance, lanes that meet it (ahead or behind), normal.
+/// Face `2 axis` (negative side) or `2 axis + 1` of a box: distance, lanes with a hit (ahead or behind), normal.
 #[inline(always)]
 pub(super) fn ray_face<T: Real>(size: &V3<T>, p: &V3<T>, d: &V3<T>, face: usize) -> (T, T::Mask, V3<T>) {
     let (k, side) = (face / 2, if face.is_multiple_of(2) { T::lit(-1.0) } else { T::lit(1.0) });

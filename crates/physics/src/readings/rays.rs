@@ -1,6 +1,6 @@
 //! Rays against shapes, and the range finder.
 //!
-//! Planes are hit on their front alone, other shapes from inside as well. Distances are in units of the ray's direction.
+//! Planes are only hit on their front, other shapes also from inside. Distances are in units of the ray's direction.
 
 use super::Readings;
 use super::hfield::{Grid, ray_hfield};
@@ -9,8 +9,7 @@ use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::model::GeomType;
 
-/// The ray from `p` along `d` against a shape, all in the shape's frame. Not for height fields and meshes: those are
-/// not hit.
+/// The ray from `p` along `d` against a shape, all in the shape's frame. Height fields and meshes are not hit here.
 #[inline(always)]
 pub(super) fn ray_shape<T: Real>(kind: GeomType, size: &V3<T>, p: &V3<T>, d: &V3<T>) -> Hit<T> {
     let mut hit = Hit::none();
@@ -33,7 +32,7 @@ pub(super) fn ray_shape<T: Real>(kind: GeomType, size: &V3<T>, p: &V3<T>, d: &V3
     hit
 }
 
-/// Roots of `a x^2 + 2 b x + c`, the smaller first, and the lanes where they are real and apart.
+/// Roots of `a x^2 + 2 b x + c`, the smaller first, and the lanes where they are real and distinct.
 #[inline(always)]
 fn roots<T: Real>(a: T, b: T, c: T) -> (T::Mask, [T; 2]) {
     let det = b.mul_add(b, -(a * c));
@@ -42,7 +41,7 @@ fn roots<T: Real>(a: T, b: T, c: T) -> (T::Mask, [T; 2]) {
     (ok, [-(b + root) * inv, (root - b) * inv])
 }
 
-/// The rectangle of a plane; a side that is not positive is endless.
+/// The rectangle of a plane. A side that is not positive is infinite.
 #[inline(always)]
 fn ray_plane<T: Real>(size: &V3<T>, p: &V3<T>, d: &V3<T>, hit: &mut Hit<T>) {
     let (z, one) = (T::zero(), T::lit(1.0));
@@ -67,7 +66,7 @@ fn ray_ellipsoid<T: Real>(size: &V3<T>, p: &V3<T>, d: &V3<T>, hit: &mut Hit<T>) 
     }
 }
 
-/// The round side of a cylinder or capsule: only the nearer of the two places ahead, as MuJoCo has it.
+/// The round side of a cylinder or capsule: only the nearer of the two hits ahead, as in MuJoCo.
 #[inline(always)]
 fn ray_tube<T: Real>(size: &V3<T>, p: &V3<T>, d: &V3<T>, hit: &mut Hit<T>) {
     let z = T::zero();
@@ -115,7 +114,7 @@ fn ray_box<T: Real>(size: &V3<T>, p: &V3<T>, d: &V3<T>, hit: &mut Hit<T>) {
     }
 }
 
-/// Lanes in which a point of a shape's own frame is inside of it.
+/// Lanes in which a point in a shape's frame is inside the shape.
 #[inline(always)]
 pub(super) fn inside_shape<T: Real>(kind: GeomType, size: &[f64; 3], p: &V3<T>) -> T::Mask {
     let (z, one) = (T::zero(), T::lit(1.0));
@@ -138,8 +137,8 @@ pub(super) fn inside_shape<T: Real>(kind: GeomType, size: &[f64; 3], p: &V3<T>) 
 }
 
 impl<T: Real> Readings<'_, T> {
-    /// What a range finder sees: the fields in `mask` (distance 1, direction 2, origin 4, point 8, normal 16, depth 32).
-    /// `None` if the model has a visible mesh, whose surface is not known.
+    /// Values of a range finder: the fields in `mask` (distance 1, direction 2, origin 4, point 8, normal 16, depth
+    /// 32). `None` if the model has a visible mesh, whose surface is not known.
     #[inline(always)]
     pub(super) fn range_finder(&self, site: usize, mask: i32) -> Option<Vec<T>> {
         let m = &self.sim.model;
@@ -148,7 +147,7 @@ impl<T: Real> Readings<'_, T> {
         let direction = self.work.motion.axes(mount)[2];
         let mut nearest = Hit::none();
         for (g, geom) in m.geoms.iter().enumerate() {
-            // what cannot be seen is not hit
+            // invisible geoms are not hit
             if geom.body == body || geom.rgba[3] == 0.0 {
                 continue;
             }
@@ -190,7 +189,7 @@ impl<T: Real> Readings<'_, T> {
         let field = &self.sim.model.hfields[index];
         let mut out = Hit::<T>::none();
         for lane in 0..T::LANES {
-            // an agent may have ground of its own, with higher hills
+            // an agent may have its own ground, with higher hills
             let own = &self.group.ground(self.sim, lane, index);
             let mut size = field.size.map(T::scalar);
             size[2] = size[2].max(own.top);

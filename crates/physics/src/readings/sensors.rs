@@ -17,7 +17,7 @@ impl<T: Real> Readings<'_, T> {
     /// * [`SensorType::InsideSite`] that measures how far a shape is enclosed;
     /// * [`SensorType::Force`] and [`SensorType::Torque`] on a site of the world;
     /// * [`SensorType::RangeFinder`] in a model with a visible mesh;
-    /// * [`SensorType::JointActuatorFrc`] of a joint on which gravity compensation counts as an actuator;
+    /// * [`SensorType::JointActuatorFrc`] of a joint whose gravity compensation counts as an actuator;
     /// * frames of cameras that turn by themselves.
     pub fn sensor(&self, sensor: usize) -> Option<Vec<T>> {
         T::enter(Evaluate { readings: *self, sensor })
@@ -49,7 +49,7 @@ impl<T: Real> Readings<'_, T> {
             (S::TendonLimitPos | S::TendonLimitVel | S::TendonLimitFrc, O::Tendon(t)) => {
                 limit_value(s.kind, &self.tendon_limit(t))
             }
-            // as in MuJoCo, the velocity is not computed
+            // as in MuJoCo, the velocity is then not computed
             (S::ActuatorVel, _) if !self.sim.model.opt.flags.actuation => vec![T::zero()],
             (S::ActuatorPos | S::ActuatorVel, O::Actuator(a)) => {
                 vec![self.transmission(a)[usize::from(s.kind == S::ActuatorVel)]]
@@ -86,7 +86,7 @@ impl<T: Real> Readings<'_, T> {
         })
     }
 
-    /// Sensors of a frame that are vectors.
+    /// Vector sensors of a frame.
     #[inline(always)]
     fn frame_value(&self, kind: SensorType, m: &Mount<T::Scalar>, reference: SensorObject) -> Option<V3<T>> {
         use SensorType as S;
@@ -126,7 +126,7 @@ impl<T: Real> Readings<'_, T> {
     }
 }
 
-/// The value of a limit that a kind of sensor asks for.
+/// The value of a limit for a kind of sensor.
 #[inline(always)]
 fn limit_value<T: Real>(kind: SensorType, limit: &LimitReading<T>) -> Vec<T> {
     vec![match kind {
@@ -136,13 +136,13 @@ fn limit_value<T: Real>(kind: SensorType, limit: &LimitReading<T>) -> Vec<T> {
     }]
 }
 
-/// How a cutoff applies to a kind of sensor.
+/// Effect of a cutoff on a kind of sensor.
 enum Range {
     /// Between minus and plus the cutoff.
     Real,
     /// Up to the cutoff.
     Positive,
-    /// Directions, orientations and contacts are not cut off.
+    /// Directions, orientations and contacts have no cutoff.
     Uncut,
 }
 

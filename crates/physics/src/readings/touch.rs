@@ -8,7 +8,7 @@ use crate::lanes::Real;
 use crate::rows::Source;
 
 impl<T: Real> Readings<'_, T> {
-    /// Normal forces of all contacts of a geom, with whatever it touches.
+    /// Normal forces of all contacts of a geom, with any other geom.
     #[inline(always)]
     pub(super) fn geom_touch(&self, geom: usize) -> T {
         let mut total = T::zero();
@@ -20,8 +20,8 @@ impl<T: Real> Readings<'_, T> {
         total
     }
 
-    /// What a touch sensor on a site feels, N, see [`Readings::touch_forces`]. The frames must be those from which the last
-    /// physics step computed its forces.
+    /// Value of a touch sensor on a site, N, see [`Readings::touch_forces`]. The frames must be those from which the
+    /// last physics step computed its forces.
     #[inline(always)]
     pub(super) fn site_touch(&self, site: usize) -> T {
         let mut total = T::zero();
@@ -41,7 +41,7 @@ impl<T: Real> Readings<'_, T> {
         total
     }
 
-    /// What a site feels of one contact.
+    /// Contribution of one contact to a site's value.
     #[inline(always)]
     fn felt(&self, site: usize, c: &ContactForce<T>) -> T {
         let s = &self.sim.model.sites[site];

@@ -1,9 +1,9 @@
 //! Constraints of up to six rows between any two bodies, or over any set of joints.
 //!
-//! Contacts of moving bodies with each other and with terrain, equality constraints, limits of tendons and of ball
-//! joints: whatever is not a contact with a level floor or a row of a single degree of freedom is a [`Block`]. A contact
-//! block is a slot: every lane fills its slots in the order of its own contacts, so that two agents that touch the
-//! ground with different limbs share a block. Lanes that leave a slot empty have stiffness zero in it.
+//! A [`Block`] is any constraint other than contacts with a level floor and rows of a single degree of freedom.
+//! Examples are contacts of moving bodies with each other and with terrain, equality constraints, and limits of tendons
+//! and ball joints. A contact block is a slot. Every lane fills its slots in the order of its own contacts, so two
+//! agents that touch the ground with different limbs share a block. Lanes with an empty slot have stiffness zero in it.
 
 use super::jacobian::{Jacobian, Side};
 use crate::lanes::Real;
@@ -12,7 +12,7 @@ use crate::sim::Cost;
 /// Values of up to six rows.
 pub(crate) type RowValues<T> = [T; 6];
 
-/// What a block stands for: the readings look for it.
+/// The constraint of a block, for the readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Source {
     /// Contacts, listed in [`Block::members`].
@@ -34,34 +34,34 @@ pub(crate) struct Block<T: Real> {
     pub cost: Cost,
     pub source: Source,
     pub dim: usize,
-    /// Some lane's rows tie two links or several joints together, so that the block does not fit the tree.
+    /// Whether some lane's rows connect two links or several joints, so that the block does not fit the tree.
     pub coupled: bool,
     pub on: T::Mask,
     /// Stiffness of the rows (of all edges of a pyramid: the first), 0 in lanes without this block.
     pub d: RowValues<T>,
-    /// Friction coefficients of rows 1 to 5; the bound of [`Cost::Dry`] is the first.
+    /// Friction coefficients of rows 1 to 5. The first is the bound of [`Cost::Dry`].
     pub mu: [T; 5],
     /// Regularized slope of an elliptic cone.
     pub slope: T,
-    /// Minus the reference acceleration.
+    /// Negative reference acceleration.
     pub u0: RowValues<T>,
-    /// `J a - aref` at the present point and at the Newton point.
+    /// `J a - aref` at the current point and at the Newton point.
     pub u: RowValues<T>,
     pub next: RowValues<T>,
-    /// Force of the present point in the sense of the solver's first identity.
+    /// Force at the current point in the sense of the solver's first identity.
     pub force: RowValues<T>,
-    /// The force near the present point is `hold - stiffness u` (lower triangle, row by row).
+    /// The force near the current point is `hold - stiffness u` (lower triangle, row by row).
     pub stiffness: [T; 21],
     pub hold: T,
-    /// Which edges push; or (bottom, middle) zone of an elliptic cone; or (below the bound, positive).
+    /// Pushing edges; or the (bottom, middle) zone of an elliptic cone; or (below the bound, positive).
     pub zones: [T::Mask; 10],
-    /// Lanes whose stiffness has changed since the sparse factorization took note of it.
+    /// Lanes whose stiffness has changed since the last update of the sparse factorization.
     pub moved: T::Mask,
-    /// Lanes whose zones are those of the evaluation before.
+    /// Lanes whose zones come from the previous evaluation.
     pub recalled: T::Mask,
-    /// Of contacts: which slot of those with as many rows.
+    /// For contacts: the index of the slot among those with as many rows.
     pub slot: usize,
-    /// Contacts in this slot: what to report the force for.
+    /// Contacts in this slot, whose forces are reported.
     pub members: Vec<(usize, T::Mask)>,
 }
 
@@ -72,7 +72,7 @@ pub(crate) const fn at(i: usize, j: usize) -> usize {
 }
 
 impl<T: Real> Block<T> {
-    /// An empty block, to be filled in.
+    /// Creates an empty block.
     pub fn new() -> Self {
         let z = T::zero();
         let side = || Side { links: Vec::with_capacity(T::LANES), r: [z; 3] };
@@ -100,7 +100,7 @@ impl<T: Real> Block<T> {
         }
     }
 
-    /// Starts the block anew: empty lanes, no members, everything zero; what it measures is still to be said.
+    /// Resets the block: empty lanes, no members, everything zero. Its Jacobian must still be set.
     #[inline(always)]
     pub fn reset(&mut self, source: Source, cost: Cost, dim: usize) {
         let z = T::zero();
@@ -119,8 +119,9 @@ impl<T: Real> Block<T> {
         self.members.clear();
     }
 
-    /// Takes over the zones of the same slot of the evaluation before, in the lanes where both hold the same contact.
-    /// Contacts come last in `past`, by class and slot, and `at` walks along them. Not of an elliptic cone, whose linear model follows the acceleration.
+    /// Takes the zones of the same slot from the previous evaluation, in the lanes where both hold the same contact.
+    /// Contacts come last in `past`, by class and slot, and `at` advances along them. Elliptic cones are excluded,
+    /// because their linear model depends on the acceleration.
     #[inline(always)]
     pub fn recall(&mut self, past: &[Block<T>], at: &mut usize) {
         match (self.source, self.cost) {

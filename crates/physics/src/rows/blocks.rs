@@ -19,12 +19,12 @@ pub(crate) struct ConstraintRows<T: Real> {
 }
 
 impl<T: Real> ConstraintRows<T> {
-    /// No rows.
+    /// Creates an empty list.
     pub fn new() -> Self {
         Self::with_capacity(0, 0, 0)
     }
 
-    /// No rows, and room for so many of the first three kinds.
+    /// Creates an empty list with capacity for the first three kinds.
     pub fn with_capacity(contacts: usize, limits: usize, dry: usize) -> Self {
         ConstraintRows {
             contacts: Vec::with_capacity(contacts),
@@ -34,7 +34,7 @@ impl<T: Real> ConstraintRows<T> {
         }
     }
 
-    /// Forgets all rows.
+    /// Removes all rows.
     #[inline(always)]
     pub fn clear(&mut self) {
         self.contacts.clear();
@@ -44,7 +44,7 @@ impl<T: Real> ConstraintRows<T> {
     }
 }
 
-/// The blocks of a step; their memory is kept from step to step.
+/// The blocks of a step. Their memory is reused from step to step.
 #[derive(Clone, Debug)]
 pub(crate) struct Blocks<T: Real> {
     items: Vec<Block<T>>,
@@ -56,12 +56,12 @@ impl<T: Real> Blocks<T> {
         Blocks { items: Vec::new(), len: 0 }
     }
 
-    /// Forgets all blocks.
+    /// Removes all blocks.
     pub fn clear(&mut self) {
         self.len = 0;
     }
 
-    /// Adds a block, whose contents are those of some earlier one, and returns its index.
+    /// Adds a block and returns its index. Its contents are those of an earlier block.
     pub fn add(&mut self) -> usize {
         if self.len == self.items.len() {
             self.items.push(Block::new());

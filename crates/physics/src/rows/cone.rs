@@ -1,9 +1,9 @@
-//! Contacts with elliptic friction cones: the cost has a flat part, a curved one, and one where nothing pushes.
+//! Contacts with elliptic friction cones: the cost has a flat part, a curved one, and one without force.
 
 use super::block::{Block, RowValues, at};
 use crate::lanes::Real;
 
-/// Where a point lies with respect to an elliptic cone.
+/// Zone of a point with respect to an elliptic cone.
 pub(super) struct ConePoint<T: Real> {
     /// The contact sticks.
     pub bottom: T::Mask,
@@ -32,7 +32,7 @@ impl<T: Real> ConePoint<T> {
         let normal = mu * u[0];
         let excess = mu.neg_mul_add(sliding, normal);
         let inside = excess.lt(z);
-        // a value on the far side of the polar cone pushes in full
+        // beyond the polar cone, the full stiffness acts
         let full = T::not(z.lt(mu.mul_add(normal, sliding)));
         let square_mu = mu * mu;
         let safe = T::select(block.on, square_mu * (one + square_mu), one);

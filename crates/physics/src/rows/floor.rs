@@ -1,6 +1,6 @@
-//! Contacts with a level plane, pyramidal cone: the case that walking consists of, and the one that is fast.
+//! Contacts with a level plane with a pyramidal cone: the fast path, and the common case in walking.
 //!
-//! The other side stands still, so the contact adds a symmetric 6x6 to its own link and nothing else.
+//! The plane is static, so the contact only adds a symmetric 6x6 matrix to its own link.
 
 use super::row::{NewtonStep, Row, replace};
 use crate::algebra::planar::Space;
@@ -11,7 +11,7 @@ use crate::lanes::Real;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FloorRow<T: Real> {
     pub link: usize,
-    /// Which of the points that may touch.
+    /// Index of the candidate point.
     pub candidate: usize,
     pub geom: usize,
     /// Geom of the plane.
@@ -24,17 +24,17 @@ pub(crate) struct FloorRow<T: Real> {
     pub mu: [T; 2],
     /// Stiffness of an edge, 0 in lanes without this contact.
     pub d: T,
-    /// Minus the reference acceleration.
+    /// Negative reference acceleration.
     pub u0: V3<T>,
-    /// `J a - aref` at the present point and at the Newton point.
+    /// `J a - aref` at the current point and at the Newton point.
     pub u: V3<T>,
     pub next: V3<T>,
-    /// Force of the present point in the sense of the solver's first identity.
+    /// Force at the current point in the sense of the solver's first identity.
     pub force: V3<T>,
     /// Edges that push.
     pub active: [T::Mask; 4],
     pub on: T::Mask,
-    /// Lanes whose active edges are those of the evaluation before.
+    /// Lanes whose active edges come from the previous evaluation.
     pub recalled: T::Mask,
 }
 
@@ -60,7 +60,7 @@ impl<T: Real> FloorRow<T> {
         [(f[0] + f[1]) + (f[2] + f[3]), m1 * (f[0] - f[1]), m2 * (f[2] - f[3])]
     }
 
-    /// Force of the row's linear model with the present active set, at `u`.
+    /// Force of the row's linear model with the current active set, at `u`.
     #[inline(always)]
     pub fn linear_force(&self, u: &V3<T>) -> V3<T> {
         let e = self.edges(u);
@@ -71,7 +71,7 @@ impl<T: Real> FloorRow<T> {
         self.total(&f)
     }
 
-    /// The force that the row exerts at `u`.
+    /// Force of the row at `u`.
     #[inline(always)]
     pub fn true_force(&self, u: &V3<T>) -> V3<T> {
         let e = self.edges(u);
@@ -90,7 +90,7 @@ impl<T: Real> FloorRow<T> {
         [t[0], t[1], t[2], world[0], world[1], world[2]]
     }
 
-    /// Sets the edges that push at `u` in the lanes `live`; returns the lanes where that is a change.
+    /// Sets the pushing edges at `u` in the lanes `live`. Returns the lanes with a change.
     #[inline(always)]
     pub fn activate(&mut self, live: T::Mask) -> T::Mask {
         let e = self.edges(&self.u);
@@ -103,7 +103,7 @@ impl<T: Real> FloorRow<T> {
         changed
     }
 
-    /// Moves to the Newton point; returns the lanes whose active edges differ there.
+    /// Moves to the Newton point. Returns the lanes whose active edges differ there.
     #[inline(always)]
     pub fn newton_point(&mut self, link_acc: &V6<T>) -> T::Mask {
         let ja = self.of_motion(link_acc);
@@ -117,7 +117,7 @@ impl<T: Real> FloorRow<T> {
         changed
     }
 
-    /// Moves; returns the lanes whose active edges changed.
+    /// Moves. Returns the lanes whose active edges changed.
     #[inline(always)]
     pub fn advance(&mut self, step: &NewtonStep<T>) -> T::Mask {
         let linear = self.linear_force(&self.next);
@@ -136,7 +136,7 @@ impl<T: Real> FloorRow<T> {
         for e in 0..4 {
             s[e] = T::masked(self.active[e], self.d);
         }
-        // the 3x3 block in the contact frame, turned into world axes
+        // the 3x3 block in the contact frame, rotated into world axes
         let nn = (s[0] + s[1]) + (s[2] + s[3]);
         let (n1, n2) = (m1 * (s[0] - s[1]), m2 * (s[2] - s[3]));
         let (t11, t22) = (m1 * m1 * (s[0] + s[1]), m2 * m2 * (s[2] + s[3]));

@@ -1,4 +1,4 @@
-//! What a [`Block`] costs and exerts at given row values.
+//! Cost and force of a [`Block`] for given row values.
 
 use super::block::{Block, RowValues, at};
 use super::cone::ConePoint;
@@ -28,7 +28,7 @@ impl<T: Real> Block<T> {
             if e.is_multiple_of(2) { self.mu[j].mul_add(x, f[j + 1]) } else { self.mu[j].neg_mul_add(x, f[j + 1]) };
     }
 
-    /// The force that the block exerts at `u`.
+    /// Force of the block at `u`.
     #[inline(always)]
     pub fn true_force(&self, u: &RowValues<T>) -> RowValues<T> {
         let z = T::zero();
@@ -54,7 +54,7 @@ impl<T: Real> Block<T> {
                 let normal = -(cone.weight * cone.excess * self.slope);
                 f[0] = T::select(cone.middle, normal, f[0]);
                 for k in 1..self.dim {
-                    // against the sliding direction, in proportion to the normal force
+                    // against the sliding direction, proportional to the normal force
                     let m = self.mu[k - 1];
                     let along = -(normal * m * (m * u[k]) * cone.inv_sliding);
                     f[k] = T::select(cone.middle, along, f[k]);
@@ -64,7 +64,7 @@ impl<T: Real> Block<T> {
         f
     }
 
-    /// Force of the linear model of the present point, at `u`.
+    /// Force of the current point's linear model, at `u`.
     #[inline(always)]
     pub fn linear_force(&self, u: &RowValues<T>) -> RowValues<T> {
         let mut f = [T::zero(); 6];
@@ -80,7 +80,7 @@ impl<T: Real> Block<T> {
         f
     }
 
-    /// Sets zones and the linear model at the present point in the lanes `live`; returns the lanes where they changed.
+    /// Sets zones and the linear model at the current point in the lanes `live`. Returns the lanes with a change.
     #[inline(always)]
     pub fn activate(&mut self, live: T::Mask) -> T::Mask {
         let z = T::zero();
@@ -142,7 +142,7 @@ impl<T: Real> Block<T> {
         changed
     }
 
-    /// Moves to the Newton point; returns the lanes where the linear model does not hold there.
+    /// Moves to the Newton point. Returns the lanes where the linear model does not hold there.
     #[inline(always)]
     pub fn newton_point(&mut self, link_acc: &[V6<T>], joint_acc: &[T]) -> T::Mask {
         let z = T::zero();
@@ -175,7 +175,7 @@ impl<T: Real> Block<T> {
         }
     }
 
-    /// Moves; returns the lanes whose linear model changed.
+    /// Moves. Returns the lanes whose linear model changed.
     #[inline(always)]
     pub fn advance(&mut self, step: &NewtonStep<T>) -> T::Mask {
         let linear = self.linear_force(&self.next);

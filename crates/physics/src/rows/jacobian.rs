@@ -1,9 +1,9 @@
-//! What the rows of a block measure: motions of points of two bodies, or sums over joints.
+//! Row values of a block: motions of points of two bodies, or sums over joints.
 
 use crate::algebra::spatial::*;
 use crate::lanes::Real;
 
-/// What the rows measure.
+/// Definition of the row values.
 #[derive(Clone, Debug)]
 pub(crate) enum Jacobian<T: Real> {
     /// Motion of a point of the second side relative to one of the first: linear along `lin` (rows 0 to 2), angular
@@ -16,7 +16,7 @@ pub(crate) enum Jacobian<T: Real> {
 /// One side of a [`Jacobian::Points`].
 #[derive(Clone, Debug)]
 pub(crate) struct Side<T: Real> {
-    /// The links that carry the point, each with the lanes where it does; no link where the point stands still.
+    /// The links that carry the point, each with its lanes. Empty for a static point.
     pub links: Vec<(usize, T::Mask)>,
     /// The point, relative to the reference point of the link's tree.
     pub r: V3<T>,

@@ -7,7 +7,7 @@ use crate::lanes::Real;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LimitRow<T: Real> {
     pub dof: usize,
-    /// Which of all limits: they come in this order.
+    /// Index among all limits, in ascending order.
     pub number: usize,
     /// +1 at the lower limit, -1 at the upper.
     pub sign: T,
@@ -18,7 +18,7 @@ pub(crate) struct LimitRow<T: Real> {
     pub force: T,
     pub active: T::Mask,
     pub on: T::Mask,
-    /// Lanes that push or not as in the evaluation before.
+    /// Lanes whose active set comes from the previous evaluation.
     pub recalled: T::Mask,
 }
 
@@ -32,16 +32,16 @@ pub(crate) struct DryRow<T: Real> {
     pub u: T,
     pub next: T,
     pub force: T,
-    /// The force is below its bound.
+    /// Whether the force is below its bound.
     pub sticking: T::Mask,
-    /// Sign of `u`, where the force is at its bound.
+    /// Sign of `u`, if the force is at its bound.
     pub positive: T::Mask,
-    /// The zone is that of the evaluation before.
+    /// Whether the zone comes from the previous evaluation.
     pub recalled: bool,
 }
 
 impl<T: Real> LimitRow<T> {
-    /// Force at `u` with the present active set.
+    /// Force at `u` with the current active set.
     #[inline(always)]
     fn linear(&self, u: T) -> T {
         -(T::masked(self.active, self.d) * u)
@@ -53,7 +53,7 @@ impl<T: Real> LimitRow<T> {
         -(self.d * u.min(T::zero()))
     }
 
-    /// Sets whether the limit pushes at `u` in the lanes `live`; returns the lanes where that is a change.
+    /// Sets whether the limit pushes at `u` in the lanes `live`. Returns the lanes with a change.
     #[inline(always)]
     pub fn activate(&mut self, live: T::Mask) -> T::Mask {
         let active = replace::<T>(live, T::and(self.u.lt(T::zero()), self.on), self.active);
@@ -114,14 +114,14 @@ impl<T: Real> DryRow<T> {
         -((self.d * u).max(-bound).min(bound))
     }
 
-    /// Force at `u` in the linear model of the present zone.
+    /// Force at `u` in the linear model of the current zone.
     #[inline(always)]
     pub fn linear(&self, u: T) -> T {
         let bound = T::splat(self.loss);
         T::select(self.sticking, -(self.d * u), T::select(self.positive, -bound, bound))
     }
 
-    /// Sets the zone at `u` in the lanes `live`; returns the lanes where that is a change.
+    /// Sets the zone at `u` in the lanes `live`. Returns the lanes with a change.
     #[inline(always)]
     pub fn activate(&mut self, live: T::Mask) -> T::Mask {
         let (sticking, positive) = self.zone(self.u);

@@ -1,4 +1,4 @@
-//! What a [`Block`] measures of the motion of links and joints, and how its forces act on them.
+//! Row values of a [`Block`] from the motion of links and joints, and the effect of its forces on them.
 
 use super::block::{Block, RowValues};
 use super::jacobian::{Jacobian, Side};
@@ -18,7 +18,7 @@ impl<T: Real> Block<T> {
         }
     }
 
-    /// Rows between two points, given by their links and places; the same links in the lanes `on`.
+    /// Rows between two points, given by their links and offsets. The links are the same in the lanes `on`.
     #[inline(always)]
     pub fn tie_points(&mut self, lin: [V3<T>; 3], ang: [V3<T>; 3], points: [(Option<usize>, V3<T>); 2], on: T::Mask) {
         if let Jacobian::Joints(_) = &self.jacobian {
@@ -36,7 +36,7 @@ impl<T: Real> Block<T> {
         }
     }
 
-    /// Row values of motions of the links and accelerations of the joints.
+    /// Row values for motions of the links and accelerations of the joints.
     #[inline(always)]
     pub fn of_motion(&self, link_acc: &[V6<T>], joint_acc: &[T]) -> RowValues<T> {
         let z = T::zero();

@@ -1,7 +1,7 @@
-//! Rows: what a constraint measures, how hard it is, and what it exerts at a given acceleration.
+//! Constraint rows: their values, stiffness, and forces at a given acceleration.
 //!
-//! Three kinds have a layout of their own because walking consists of them: points above a level floor ([`FloorRow`]),
-//! limits of hinges and slides ([`LimitRow`]), dry friction ([`DryRow`]). Everything else is a [`Block`].
+//! Three kinds that dominate in walking have their own layout: points above a level floor ([`FloorRow`]), limits of
+//! hinges and slides ([`LimitRow`]), dry friction ([`DryRow`]). Everything else is a [`Block`].
 
 mod block;
 mod blocks;

@@ -1,39 +1,38 @@
-//! What all rows have in common: how the line search and the Newton iteration see them.
+//! The common interface of rows for the line search and the Newton iteration.
 
 use crate::lanes::Real;
 
-/// What the line search needs of a constraint.
+/// A constraint, as seen by the line search.
 pub(crate) trait Row<T: Real> {
-    /// Along the way from the present point to the Newton point: the interpolated force at the start, the one at the
+    /// Along the segment from the current point to the Newton point: the interpolated force at the start and at the
     /// end, and the true force at the start.
     fn ends(&self) -> [T; 3];
-    /// First and second derivative of the row's cost at a fraction of the way.
+    /// First and second derivative of the row's cost at a fraction of the segment.
     fn slope(&self, alpha: T) -> [T; 2];
 }
 
-/// How far the lanes go towards the Newton point.
+/// How far the lanes move towards the Newton point.
 #[derive(Clone, Copy)]
 pub(crate) struct NewtonStep<T: Real> {
-    /// Lanes that stay where they are.
+    /// Lanes that do not move.
     pub done: T::Mask,
-    /// Lanes that go all the way.
+    /// Lanes that move to the Newton point.
     pub exact: T::Mask,
-    /// Fraction of the way of the others.
+    /// Fraction of the segment for the other lanes.
     pub alpha: T,
-    /// Lanes that will be done after this: they keep the system that they were solved with, whatever other lanes go on
-    /// to do.
+    /// Lanes that are done after this step. They keep the system that they were solved with, regardless of other lanes.
     pub last: T::Mask,
 }
 
 impl<T: Real> NewtonStep<T> {
-    /// From `here` towards `there`.
+    /// The new point between `here` and `there`.
     #[inline(always)]
     pub fn of(&self, here: T, there: T) -> T {
         let moved = T::select(self.exact, there, self.alpha.mul_add(there - here, here));
         T::select(self.done, here, moved)
     }
 
-    /// Lanes whose zones follow them.
+    /// Lanes whose zones are updated.
     #[inline(always)]
     pub fn live(&self) -> T::Mask {
         T::not(T::or(self.done, self.last))
@@ -46,7 +45,8 @@ pub(crate) fn replace<T: Real>(live: T::Mask, new: T::Mask, old: T::Mask) -> T::
     T::or(T::and(live, new), T::and(T::not(live), old))
 }
 
-/// The former row with a number, if there is one; both come in ascending order, and `at` walks along the former.
+/// The previous row with a number, if there is one. Both come in ascending order, and `at` advances along the previous
+/// rows.
 #[inline(always)]
 pub(crate) fn former<'a, R>(
     rows: &'a [R],

@@ -3,10 +3,10 @@
 use crate::lanes::Real;
 use crate::model::{Actuator, Dynamics, Model, Transmission};
 
-/// What an actuator pulls at.
+/// Target of an actuator.
 #[derive(Clone, Debug)]
 pub(crate) enum TransmissionSpec<C> {
-    /// Degrees of freedom and their gears; `qpos` is the coordinate of a scalar joint, for affine gains and biases.
+    /// Degrees of freedom and their gears. `qpos` is the coordinate of a scalar joint, for affine gains and biases.
     Joint { dofs: std::ops::Range<usize>, qpos: usize, gear: [C; 6] },
     /// A tendon, and the gear.
     Tendon { index: usize, gear: C },
@@ -20,7 +20,7 @@ pub(crate) struct ActuatorSpec<C> {
     pub force: Option<(C, C)>,
     pub gain: [C; 3],
     pub bias: [C; 3],
-    /// Plain motor: force = gain * input.
+    /// Whether it is a plain motor: force = gain * input.
     pub plain: bool,
     pub activation: Option<Activation<C>>,
 }
@@ -30,12 +30,12 @@ pub(crate) struct ActuatorSpec<C> {
 pub(crate) struct Activation<C> {
     /// Index in `act`.
     pub index: usize,
-    /// Rate of change per unit of distance from the control; `None` integrates the control.
+    /// Rate of change per unit of distance from the control. `None` integrates the control.
     pub rate: Option<C>,
-    /// Seconds by which the rate of change is multiplied over a step.
+    /// Time that multiplies the rate of change over a step, s.
     pub reach: C,
     pub range: Option<(C, C)>,
-    /// The force follows the activation at the end of the step.
+    /// Whether the force follows the activation at the end of the step.
     pub early: bool,
 }
 
@@ -86,7 +86,7 @@ pub(super) fn actuators<T: Real>(model: &Model) -> Vec<ActuatorSpec<T::Scalar>> 
     if flags.actuation { model.actuators.iter().map(spec).collect() } else { Vec::new() }
 }
 
-/// Bounds of what all actuators together exert on a degree of freedom.
+/// Bounds of the total actuator force on a degree of freedom.
 pub(super) fn joint_force_ranges<T: Real>(model: &Model) -> Vec<(usize, T::Scalar, T::Scalar)> {
     let bounded = |j: &crate::model::Joint| {
         j.actuator_force_range.map(|[low, high]| (j.dof_adr, T::scalar(low), T::scalar(high)))

@@ -1,28 +1,28 @@
-//! Which pairs belong to which groups, for the broad phase of models with many pairs: every tree, and every geom that
-//! stands still, is a group.
+//! Groups for the broad phase of models with many pairs, and the pairs of each two groups. Every tree and every static
+//! geom is a group.
 
 use super::pairs::{GeomPair, PairSpec, Paired};
 use crate::lanes::Real;
 
-/// Pairs across trees from which on the broad phase is worth its while.
+/// Number of pairs across trees from which the broad phase pays off.
 const FEWEST: usize = 500;
 
-/// Which pairs belong to which groups.
+/// The pairs of each two groups.
 #[derive(Clone, Debug)]
 pub(crate) struct Broad<C> {
     /// Geoms of each group.
     pub members: Vec<Vec<usize>>,
-    /// By group: the groups with numbers not below that its geoms have pairs with, ascending, and where those begin and
-    /// end in `pairs`.
+    /// By group: the groups with the same or a higher number that its geoms have pairs with, ascending, and the range
+    /// of these pairs in `pairs`.
     partners: Vec<Vec<(usize, usize, usize)>>,
-    /// Numbers of the pairs, by groups.
+    /// Indices of the pairs, by groups.
     pairs: Vec<u32>,
     /// Added on every side of a box: half of the largest margin.
     pub margin: C,
 }
 
 impl<C: Real> Broad<C> {
-    /// Sorts the pairs of a model into groups; none if they are few. `tree_of` gives the tree of a geom that moves.
+    /// Sorts the pairs of a model into groups. `None` for few pairs. `tree_of` gives the tree of a moving geom.
     pub fn of(
         paired: &[Paired<C>],
         geom_pairs: &[GeomPair],
@@ -63,7 +63,7 @@ impl<C: Real> Broad<C> {
 }
 
 impl<C> Broad<C> {
-    /// Numbers of the pairs of geoms of two groups.
+    /// Indices of the pairs of geoms of two groups.
     pub fn between(&self, a: usize, b: usize) -> &[u32] {
         let partners = &self.partners[a.min(b)];
         match partners.binary_search_by_key(&a.max(b), |p| p.0) {

@@ -19,9 +19,9 @@ pub(crate) struct Caps {
     pub ls_tolerance: f64,
     /// Scale of costs and gradients if there are no islands.
     pub scale: f64,
-    /// Trees that no constraint connects are solved separately.
+    /// Whether trees that no constraint connects are solved separately.
     pub islands: bool,
-    /// Conjugate gradients instead of Newton's method.
+    /// Whether to use conjugate gradients instead of Newton's method.
     pub conjugate: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Which geoms collide, and with which parameters.
+//! Selection of colliding geoms, and their contact parameters.
 
 use super::weld::BodyMount;
 use crate::model::{Geom, Model, Pair};
@@ -19,7 +19,7 @@ pub(super) struct ContactParams {
 }
 
 impl ContactParams {
-    /// Parameters of the contacts of geoms `i` and `j`, which collide, by their declaration if they have one.
+    /// Contact parameters of the colliding geoms `i` and `j`, from their declaration if there is one.
     pub fn of(model: &Model, i: usize, j: usize, declared: Option<&Pair>) -> Self {
         let mut params = match declared {
             Some(pair) => ContactParams::declared(pair),
@@ -35,7 +35,7 @@ impl ContactParams {
         params
     }
 
-    /// MuJoCo's combination rule: the geom of higher priority decides, equals are mixed.
+    /// MuJoCo's combination rule: the geom of higher priority wins; equal priorities are mixed.
     fn combine(a: &Geom, b: &Geom) -> Self {
         let margin = a.margin + b.margin;
         if a.priority != b.priority {
@@ -84,8 +84,8 @@ fn spread(f: &[f64; 3]) -> [f64; 5] {
     [f[0], f[0], f[1], f[2], f[2]]
 }
 
-/// The declared pairs by their geoms, the lower number first. Filters do not apply to them; of two declarations of one
-/// pair, the first counts.
+/// The declared pairs by their geoms, the lower number first. Filters do not apply to them. If a pair is declared
+/// twice, the first declaration counts.
 pub(super) fn declared(model: &Model) -> BTreeMap<[usize; 2], &Pair> {
     let mut pairs = BTreeMap::new();
     for pair in &model.pairs {
@@ -119,7 +119,7 @@ pub(super) fn may_collide(
     !excluded.contains(&pair)
 }
 
-/// "'name'", or the number of a nameless geom.
+/// "'name'", or the index of a nameless geom.
 pub(super) fn label(model: &Model, geom: usize) -> String {
     match model.geoms[geom].name.as_str() {
         "" => match model.bodies[model.geoms[geom].body].name.as_str() {

@@ -1,7 +1,7 @@
-//! Which geoms may touch: the list of contacts, made once per model.
+//! Geoms that may touch: the list of possible contacts, created once per model.
 //!
 //! Points of spheres, capsules and boxes above a level plane are the common case and have their own list
-//! ([`floor_points`]); everything else is listed by [`pairs`].
+//! ([`floor_points`]). [`pairs`] lists everything else.
 
 use super::broad::Broad;
 use super::contact_params::{ContactParams, declared, label, may_collide};
@@ -15,32 +15,32 @@ use crate::lanes::Real;
 use crate::model::{Geom, GeomType, Model};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Everything that may touch.
+/// All possible contacts.
 #[derive(Clone, Debug)]
 pub(crate) struct Contacts<C> {
     /// Points above level planes.
     pub floor: Vec<FloorPoint<C>>,
-    /// Other pairs of geoms, those of a kind next to each other.
+    /// Other pairs of geoms, sorted by kind.
     pub pairs: Vec<GeomPair>,
-    /// What those pairs are.
+    /// Parameters of those pairs, by kind.
     pub specs: Vec<PairSpec<C>>,
     /// Geoms of those pairs.
     pub paired: Vec<Paired<C>>,
-    /// Some are [hard](super::weights::is_hard).
+    /// Whether some are [hard](super::weights::is_hard).
     pub hard: bool,
-    /// How to find those of the pairs that may touch, if they are many.
+    /// The broad phase of those pairs, if they are many.
     pub broad: Option<Broad<C>>,
 }
 
-/// Most geoms that may collide: the time to compare them grows with the square of their number.
+/// Maximum number of geoms that may collide: the time to compare them grows with the square of their number.
 const MOST_GEOMS: usize = 50_000;
-/// Bytes of a pair, with the room that a growing list, its sorting and the broad phase take.
+/// Bytes per pair, including the overhead of growing the list, sorting it and the broad phase.
 const PAIR: usize = 4 * size_of::<GeomPair>();
-/// Pairs between two looks at the memory.
+/// Number of pairs between two checks of the memory.
 const LOOK: usize = 1 << 16;
 
 impl<C> Contacts<C> {
-    /// Compares the memory of the lists with the limit, once per so many pairs.
+    /// Checks the memory of the lists against the limit, once per `LOOK` pairs.
     fn check(&self) -> Result<(), OverBudget> {
         match self.pairs.len() % LOOK {
             0 => MEMORY.check((self.pairs.len() * PAIR + self.specs.len() * 2 * size_of::<PairSpec<C>>()) as f64),
@@ -60,7 +60,7 @@ impl<C> Contacts<C> {
         }
     }
 
-    /// A pair by its number.
+    /// A pair by its index.
     #[inline(always)]
     pub fn pair<'a>(&'a self, geoms: &[Mount<C>], index: usize) -> GeomPairOf<'a, C> {
         let pair = &self.pairs[index];
@@ -69,8 +69,7 @@ impl<C> Contacts<C> {
     }
 }
 
-/// Lists the contacts of a model; refuses those that are not simulated. `link_of` numbers the bodies that move, `tree_of`
-/// the trees of those.
+/// Lists the contacts of a model. Refuses unsupported ones. `link_of` numbers the moving bodies, `tree_of` their trees.
 pub(super) fn contacts<T: Real>(
     model: &Model,
     mounts: &[BodyMount],
@@ -89,9 +88,9 @@ pub(super) fn contacts<T: Real>(
     let excluded: BTreeSet<[usize; 2]> = model.excludes.iter().copied().collect();
     let declared = declared(model);
     let kinds = kinds(model, mounts, link);
-    // what pairs of two kinds have in common; the geoms of a crowd are of few kinds
+    // common parameters of pairs of two kinds; a crowd has few kinds of geoms
     let mut known: BTreeMap<[usize; 2], u32> = BTreeMap::new();
-    // visual geoms collide with nothing
+    // visual geoms never collide
     let mut able: Vec<bool> = model.geoms.iter().map(|g| g.contype != 0 || g.conaffinity != 0).collect();
     declared.keys().flatten().for_each(|g| able[*g] = true);
     let able: Vec<usize> = (0..able.len()).filter(|g| able[*g]).collect();
@@ -109,7 +108,7 @@ pub(super) fn contacts<T: Real>(
             }
             match (link(i), link(j)) {
                 (None, None) => continue,
-                // what a declared pair of one link exerts on one geom it takes from the other
+                // forces of a declared pair within one link cancel
                 (Some(a), Some(b)) if a == b => continue,
                 (Some(_), Some(_)) if options.ground_contacts_only => continue,
                 _ => {}
@@ -140,7 +139,7 @@ pub(super) fn contacts<T: Real>(
             }
         }
     }
-    // the candidates of a geom are neighbors; the order of planes within a geom stays
+    // the candidates of a geom are adjacent; the order of planes within a geom stays
     out.floor.sort_by_key(|c| c.geom);
     // slots of one class are filled together
     out.pairs.sort_by_key(|p| out.specs[p.spec as usize].class());
@@ -154,18 +153,18 @@ pub(super) fn contacts<T: Real>(
     Ok(out)
 }
 
-/// Geoms from which on a model is a crowd.
+/// Number of geoms from which a model counts as a crowd.
 const CROWD: usize = 200;
 
-/// A number to twelve digits.
+/// Rounds a number to twelve digits.
 fn rounded(x: f64) -> f64 {
     const LOST: u64 = 1 << 12;
     f64::from_bits((x.to_bits() + LOST / 2) & !(LOST - 1))
 }
 
-/// Numbers of the geoms' kinds: equal geoms of equal bodies that move are of one kind, whatever their names and whatever
-/// carries their bodies. In a crowd, inverse weights that differ by rounding are equal: copies of a body in other places
-/// would all be of kinds of their own.
+/// Numbers of the geoms' kinds. Equal geoms of equal moving bodies have the same kind, regardless of names and parents.
+/// In a crowd, inverse weights that differ only by rounding count as equal. Otherwise copies of a body at other
+/// positions would all have different kinds.
 fn kinds(model: &Model, mounts: &[BodyMount], link: impl Fn(usize) -> Option<usize>) -> Vec<usize> {
     let mut numbers: BTreeMap<Vec<u64>, usize> = BTreeMap::new();
     let mut kind = |(index, g): (usize, &Geom)| {
@@ -185,7 +184,7 @@ fn kinds(model: &Model, mounts: &[BodyMount], link: impl Fn(usize) -> Option<usi
     model.geoms.iter().enumerate().map(&mut kind).collect()
 }
 
-/// Place in MuJoCo's order of shape types.
+/// Rank in MuJoCo's order of shape types.
 fn rank(kind: GeomType) -> usize {
     match kind {
         GeomType::Plane => 0,

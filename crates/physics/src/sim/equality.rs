@@ -1,4 +1,4 @@
-//! Equality constraints: bodies, joints and tendons tied together.
+//! Equality constraints: connected bodies, joints and tendons.
 
 use super::link::Mount;
 use super::softness::{Softness, softness};
@@ -10,14 +10,14 @@ use crate::algebra::spatial::{quat_mul, rot_to_quat};
 use crate::lanes::Real;
 use crate::model::{EqualityKind, Model};
 
-/// An equality constraint as the kernels see it.
+/// An equality constraint for the kernels.
 #[derive(Clone, Debug)]
 pub(crate) struct EqualitySpec<C> {
     /// Index in the model.
     pub index: usize,
     pub tie: Tie<C>,
     pub soft: Softness<C>,
-    /// Approximate inverse inertia seen by the rows of positions and by those of orientations.
+    /// Approximate inverse inertia for the rows of positions and for those of orientations.
     pub diag: [C; 2],
     /// See [`is_hard`].
     pub hard: bool,
@@ -27,11 +27,11 @@ pub(crate) struct EqualitySpec<C> {
 pub(crate) enum Tie<C> {
     /// Points (and with `frames` orientations) of two bodies.
     Bodies { points: [Mount<C>; 2], frames: Option<Frames<C>> },
-    /// A length, and one that it follows by a polynomial.
+    /// A length, and one whose polynomial it follows.
     Lengths { follower: Length<C>, leader: Option<Length<C>>, poly: [C; 5] },
 }
 
-/// What a weld holds besides points.
+/// Additional data of a weld.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Frames<C> {
     /// Orientations of the frames on their links (in the world for static bodies).
@@ -40,14 +40,14 @@ pub(crate) struct Frames<C> {
     pub scale: C,
 }
 
-/// A joint's position or a tendon's length, measured from the reference configuration.
+/// A joint's position or a tendon's length, relative to the reference configuration.
 #[derive(Clone, Debug)]
 pub(crate) struct Length<C> {
     pub terms: Vec<Term<C>>,
     pub zero: C,
 }
 
-/// Prepares the constraints that hold from the start.
+/// Prepares the constraints that are active from the start.
 pub(super) fn equalities<T: Real>(
     model: &Model,
     mounts: &[BodyMount],

@@ -1,7 +1,7 @@
 //! Points of moving geoms that may touch a level plane.
 //!
-//! A moving geom meets a plane in points that are known in advance: a sphere in one, a capsule in two, a box in its
-//! corners. Each is a [`FloorPoint`].
+//! The candidate points are known in advance: one for a sphere, two for a capsule, the corners for a box. Each is a
+//! [`FloorPoint`].
 
 use super::contact_params::ContactParams;
 use super::softness::{Softness, softness};
@@ -19,22 +19,22 @@ pub(crate) struct FloorPoint<C> {
     pub geom: usize,
     /// Geom of the plane.
     pub plane: usize,
-    /// Center of the sphere that touches (radius 0 for a box corner), in the link's frame.
+    /// Center of the touching sphere (radius 0 for a box corner), in the link's frame.
     pub point: [C; 3],
     pub radius: C,
-    /// Capsule axis in the link's frame: the first tangent is its projection.
+    /// Capsule axis in the link's frame. The first tangent is its projection.
     pub axis: Option<[C; 3]>,
-    /// Center of the box that this is a corner of, and the number of the corner among its eight.
+    /// For a box corner: the center of the box, and the index of the corner (0 to 7).
     pub corner: Option<([C; 3], usize)>,
     /// Height of the plane.
     pub height: C,
-    /// Friction along the two tangents; zero for a frictionless contact.
+    /// Friction along the two tangents. Zero for a frictionless contact.
     pub mu: [C; 2],
     pub soft: Softness<C>,
 }
 
-/// Adds the points of a moving geom that may touch a level plane. Returns whether the list takes it: pyramidal cones
-/// of condim 1 or 3, spheres, capsules and boxes. Sets `hard` if the points [are](is_hard).
+/// Adds the points of a moving geom that may touch a level plane. Returns whether the list supports the pair: pyramidal
+/// cones of condim 1 or 3, spheres, capsules and boxes. Sets `hard` if the points [are](is_hard).
 pub(super) fn add<T: Real>(
     model: &Model,
     mounts: &[BodyMount],
@@ -108,7 +108,7 @@ pub(super) fn add<T: Real>(
                 });
             }
         }
-        _ => unreachable!("other shapes were sent away above"),
+        _ => unreachable!("other shapes were excluded above"),
     }
     true
 }

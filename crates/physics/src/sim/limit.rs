@@ -1,4 +1,4 @@
-//! Limits of joints and dry friction.
+//! Limits of joints, and dry friction.
 
 use super::softness::{Softness, softness};
 use crate::lanes::Real;
@@ -9,10 +9,10 @@ use crate::model::{JointType, Model};
 pub(crate) struct LimitSpec<C> {
     pub qpos: usize,
     pub dof: usize,
-    /// Limits as sums of two numbers each: what rounding takes from a limit would be a large part of a small violation.
+    /// Limits as sums of two numbers each. The rounding error of a limit would be large relative to a small violation.
     pub low: [C; 2],
     pub high: [C; 2],
-    /// Both sides can be violated at once: two rows instead of one.
+    /// Whether both sides can be violated at once: two rows instead of one.
     pub two_sided: bool,
     pub soft: Softness<C>,
 }
@@ -77,7 +77,7 @@ pub(super) fn dry_friction<T: Real>(model: &Model) -> Vec<DryFriction<T::Scalar>
         .collect()
 }
 
-/// A number as the sum of its rounded value and the rest.
+/// A number as the sum of its rounded value and the remainder.
 pub(crate) fn split<T: Real>(x: f64) -> [T::Scalar; 2] {
     let rounded = T::scalar(x);
     [rounded, T::scalar(x - T::widen(rounded))]

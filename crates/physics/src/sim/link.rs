@@ -1,11 +1,11 @@
-//! Bodies that move ("links"), their joints, and the frames that they carry.
+//! Moving bodies ("links"), their joints, and the frames that they carry.
 
 use super::weld::{BodyMount, lump};
 use crate::algebra::rigid;
 use crate::lanes::Real;
 use crate::model::{JointType, Model};
 
-/// A body that moves.
+/// A moving body.
 #[derive(Clone, Debug)]
 pub(crate) struct Link<C> {
     /// Index of the parent link; `None` for the root of a tree.
@@ -25,9 +25,9 @@ pub(crate) struct Link<C> {
     /// Last child, and the child of the same parent before this one.
     pub last_child: Option<usize>,
     pub sibling: Option<usize>,
-    /// A free joint whose six diagonal entries are equal in pairs: solved as one 6x6 block.
+    /// Whether it is a free joint whose six diagonal entries are equal in groups: solved as one 6x6 block.
     pub free_block: bool,
-    /// A free body with nothing that moves on it.
+    /// Whether it is a free body without moving children.
     pub alone: bool,
 }
 
@@ -40,7 +40,7 @@ pub(crate) struct LinkJoint<C> {
     pub pos: [C; 3],
     pub centered: bool,
     pub axis: [C; 3],
-    /// The axis is +-x, +-y or +-z of the link: rotation touches two columns only.
+    /// Set if the axis is +-x, +-y or +-z of the link: rotation then changes only two columns.
     pub aligned: Option<(usize, bool)>,
     pub q0: C,
     pub stiffness: C,
@@ -48,7 +48,7 @@ pub(crate) struct LinkJoint<C> {
     pub has_spring: bool,
 }
 
-/// Where a body sits on its link: for reading poses of welded bodies.
+/// Pose of a body on its link, for reading poses of welded bodies.
 #[derive(Clone, Debug)]
 pub(crate) struct Mount<C> {
     /// Link, or `None` for static bodies.
@@ -57,7 +57,7 @@ pub(crate) struct Mount<C> {
     pub rot: [[C; 3]; 3],
 }
 
-/// Link numbers of the bodies that move.
+/// Link numbers of the moving bodies.
 pub(super) fn number_links(model: &Model) -> Vec<Option<usize>> {
     let mut count = 0;
     let moves = |(i, body): (usize, &crate::model::Body)| {
@@ -148,7 +148,7 @@ pub(super) fn joints<T: Real>(model: &Model) -> Vec<LinkJoint<T::Scalar>> {
 }
 
 impl<C: Copy> Mount<C> {
-    /// A frame fixed to a body, as seen from the link that the body moves with.
+    /// A frame fixed to a body, relative to the link that the body moves with.
     pub(super) fn new<T: Real<Scalar = C>>(
         mounts: &[BodyMount],
         link_of: &[Option<usize>],
@@ -162,8 +162,8 @@ impl<C: Copy> Mount<C> {
     }
 }
 
-/// Whether every joint slides in the x-z plane or turns about y, and no link is turned out of that plane: exactly, as
-/// the lanes will see it.
+/// Whether every joint slides in the x-z plane or turns about y, and no link is rotated out of that plane: exactly, in
+/// the lanes' precision.
 pub(super) fn is_planar<C: Copy + PartialEq + Default>(model: &Model, links: &[Link<C>]) -> bool {
     let zero = C::default();
     let in_plane = |c: &[C; 3]| c[1] == zero;

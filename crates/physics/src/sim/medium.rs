@@ -5,13 +5,13 @@ use crate::algebra::rigid::rotate;
 use crate::lanes::Real;
 use crate::model::Model;
 
-/// Upward force that carries part of a link's weight.
+/// Upward force that compensates part of a link's weight.
 #[derive(Clone, Debug)]
 pub(crate) struct GravComp<C> {
     pub link: usize,
-    /// Where it acts, in the link's frame.
+    /// Point of application, in the link's frame.
     pub at: [C; 3],
-    /// Mass that it carries, kg.
+    /// Mass that it compensates, kg.
     pub mass: C,
 }
 
@@ -27,13 +27,13 @@ pub(crate) struct Drag<C> {
     pub linear: [C; 3],
 }
 
-/// Whether there are passive forces at all: as in MuJoCo, none where both springs and dampers are off.
+/// Whether there are passive forces at all. As in MuJoCo, there are none if both springs and dampers are off.
 fn passive(model: &Model) -> bool {
     model.opt.flags.spring || model.opt.flags.damper
 }
 
-/// Prepares the compensation of gravity: one force per link, and another for bodies that are made heavier. As in MuJoCo,
-/// those count only in a model that makes some body lighter.
+/// Prepares gravity compensation: one force per link, and another for negative compensation, which makes bodies
+/// heavier. As in MuJoCo, the latter counts only in a model that also makes some body lighter.
 pub(super) fn gravity_compensation<T: Real>(
     model: &Model,
     mounts: &[BodyMount],

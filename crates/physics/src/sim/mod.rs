@@ -1,9 +1,9 @@
-//! The model as the kernels see it: links, joints, contact candidates and actuators with constants in lane precision.
+//! The model for the kernels: links, joints, contact candidates and actuators with constants in lane precision.
 //!
-//! Bodies without joints are merged into the body they are welded to, so the kernels only meet bodies that move
-//! ("links"). The simulator refuses by name what it does not simulate ([`unsupported`], [`contacts`]); it ignores nothing.
+//! Bodies without joints are merged into the body they are welded to, so the kernels only see moving bodies ("links").
+//! The simulator refuses unsupported elements by name ([`unsupported`], [`contacts`]) and ignores nothing.
 //!
-//! Each file prepares one kind of constant; the kernels that read it are in the folders above.
+//! Each file prepares one kind of constant. The kernels that read it are in the folders above.
 
 mod actuator;
 mod broad;
@@ -41,7 +41,7 @@ use crate::geometry::height::HeightField;
 use crate::lanes::Real;
 use crate::model::{Cone, Integrator, Model};
 
-/// Everything constant about a simulation in lane precision.
+/// All constants of a simulation in lane precision.
 #[derive(Clone, Debug)]
 pub struct Sim<T: Real> {
     pub(crate) model: Model,
@@ -52,17 +52,17 @@ pub struct Sim<T: Real> {
     pub(crate) joints: Vec<LinkJoint<T::Scalar>>,
     pub(crate) armature: Vec<T::Scalar>,
     pub(crate) damping: Vec<T::Scalar>,
-    /// Damping is taken at the end of the step.
+    /// Whether damping is taken at the end of the step.
     pub(crate) implicit_damping: bool,
-    /// So are the actuators' forces that depend on velocity.
+    /// Whether velocity-dependent actuator forces are, too.
     pub(crate) implicit_fast: bool,
-    /// Some rows are so hard that single precision does not resolve their forces, though it does the accelerations: the
-    /// velocities follow from those.
+    /// Whether some rows are so hard that single precision resolves their accelerations but not their forces. The
+    /// velocities then follow from the accelerations.
     pub(crate) hard: bool,
     pub(crate) limits: Vec<LimitSpec<T::Scalar>>,
     pub(crate) dry: Vec<DryFriction<T::Scalar>>,
     pub(crate) actuators: Vec<ActuatorSpec<T::Scalar>>,
-    /// Bounds of what all actuators together exert on a degree of freedom.
+    /// Bounds of the total actuator force on a degree of freedom.
     pub(crate) joint_force_ranges: Vec<(usize, T::Scalar, T::Scalar)>,
     pub(crate) equalities: Vec<EqualitySpec<T::Scalar>>,
     pub(crate) tendons: Vec<TendonSpec<T::Scalar>>,
@@ -72,7 +72,7 @@ pub struct Sim<T: Real> {
     pub(crate) wind: [T::Scalar; 3],
     pub(crate) contacts: Contacts<T::Scalar>,
     pub(crate) fields: Vec<HeightField<T::Scalar>>,
-    /// Frames, centers of mass (inertial frames), geoms and sites as seen from the links they move with.
+    /// Frames, centers of mass (inertial frames), geoms and sites relative to the links they move with.
     pub(crate) bodies: Vec<Mount<T::Scalar>>,
     pub(crate) coms: Vec<Mount<T::Scalar>>,
     pub(crate) geoms: Vec<Mount<T::Scalar>>,
@@ -80,15 +80,15 @@ pub struct Sim<T: Real> {
     pub(crate) dt: T::Scalar,
     pub(crate) gravity: [T::Scalar; 3],
     pub(crate) rk4: bool,
-    /// All motion is in the x-z plane: see [`Planar`](crate::algebra::planar::Planar).
+    /// Whether all motion is in the x-z plane: see [`Planar`](crate::algebra::planar::Planar).
     pub(crate) planar: bool,
-    /// Contacts have elliptic cones.
+    /// Whether contacts have elliptic cones.
     pub(crate) elliptic: bool,
     pub(crate) warmstart: bool,
     /// Solver settings of models whose iteration cap stops the solver before it converges.
     pub(crate) capped: Option<Caps>,
     pub(crate) max_newton: usize,
-    /// Rows between moving bodies beyond which an agent is factorized on its own.
+    /// Number of rows between moving bodies above which an agent is factorized separately.
     pub(crate) most_rows: usize,
     pub(crate) max_line_search: usize,
     /// Newton decrement at which a lane counts as converged.
@@ -119,7 +119,7 @@ impl<T: Real> Sim<T> {
         let tolerance = 2.0 * model.opt.tolerance * model.stat.mean_inertia * model.nv.max(1) as f64;
         Ok(Sim {
             trees,
-            dof_link: model.dofs.iter().map(|d| link_of[d.body].expect("it moves")).collect(),
+            dof_link: model.dofs.iter().map(|d| link_of[d.body].expect("dofs belong to moving bodies")).collect(),
             joints: link::joints::<T>(model),
             armature: model.dofs.iter().map(|d| c(d.armature)).collect(),
             damping: model.dofs.iter().map(|d| c(if flags.damper { d.damping } else { 0.0 })).collect(),
@@ -158,7 +158,7 @@ impl<T: Real> Sim<T> {
         })
     }
 
-    /// The compiled model that this was made from.
+    /// The compiled model of this simulation.
     pub fn model(&self) -> &Model {
         &self.model
     }

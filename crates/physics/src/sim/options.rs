@@ -1,23 +1,23 @@
-//! What a user chooses when building a [`Sim`](super::Sim), and why that may fail.
+//! Options for building a [`Sim`](super::Sim), and the reasons why that may fail.
 
 use crate::budget::OverBudget;
 use thiserror::Error;
 
-/// Rows between moving links (and over several joints) up to which an agent is solved by a correction of low rank. Eight
-/// contacts with friction: more than a figure has with itself but in rare heaps.
+/// Maximum number of rows between moving links (and over several joints) for which an agent is solved by a low-rank
+/// correction. It equals eight contacts with friction: more than a character has with itself, except in rare cases.
 pub(crate) const MOST_COUPLED_ROWS: usize = 24;
 
-/// Why a model cannot be simulated.
+/// Reason why a model cannot be simulated.
 #[derive(Debug, Error, PartialEq)]
 pub enum SimError {
-    /// The model uses something that this engine does not simulate.
+    /// The model uses something that this engine does not support.
     #[error("model '{model}': {what} is not supported by the simulator; {remedy}")]
     Unsupported {
         /// Model name.
         model: String,
         /// The offending element by name.
         what: String,
-        /// What to do about it.
+        /// What the user can do about it.
         remedy: String,
     },
     /// The lists of a simulation would take more memory than the [budget](crate::budget) allows.
@@ -30,16 +30,16 @@ pub enum SimError {
     },
 }
 
-/// Choices a user makes when building a [`Sim`](crate::Sim).
+/// Options for building a [`Sim`](crate::Sim).
 #[derive(Clone, Debug, Default)]
 pub struct SimOptions {
-    /// Simulate contacts with the static world alone even if the model's moving geoms could collide with each other (by
+    /// Simulate only contacts with the static world, even if the model's moving geoms could collide with each other (by
     /// their contype and conaffinity).
     pub ground_contacts_only: bool,
     /// Overrides the model's cap on the solver's iterations. Below 50, the solver follows MuJoCo's iteration step by
     /// step and stops where MuJoCo stops.
     pub max_newton: Option<usize>,
-    /// Overrides the number of rows between moving bodies beyond which an agent is solved as a crowd (24). It changes
-    /// the time of a step, and its results to rounding.
+    /// Overrides the number of rows between moving bodies above which an agent is solved as a crowd (24). It changes
+    /// the time of a step, and its results by rounding.
     pub most_coupled_rows: Option<usize>,
 }

@@ -50,7 +50,7 @@ impl ShapePair {
     }
 }
 
-/// What decides whether a pair can touch at all.
+/// Test that decides whether a pair can touch at all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Cull {
     /// Balls around both.
@@ -61,24 +61,24 @@ pub(crate) enum Cull {
     Field,
 }
 
-/// Two geoms that may touch: there can be millions of these.
+/// Two geoms that may touch. There can be millions of these.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GeomPair {
     /// In MuJoCo's order: the normal points from the first to the second.
     pub geoms: [u32; 2],
-    /// Number of its [`PairSpec`].
+    /// Index of its [`PairSpec`].
     pub spec: u32,
 }
 
-/// A geom that meets others.
+/// A geom that is part of pairs.
 #[derive(Clone, Debug)]
 pub(crate) struct Paired<C> {
     pub geom: usize,
-    /// Length on either side of the center along the third axis, of a capsule; else 0, and it is a ball that bounds it.
+    /// Half length of a capsule along the third axis. Other geoms have 0, and a ball bounds them.
     pub half: C,
 }
 
-/// A pair with everything that belongs to it.
+/// A pair with its data.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct GeomPairOf<'a, C> {
     pub geoms: [usize; 2],
@@ -86,15 +86,15 @@ pub(crate) struct GeomPairOf<'a, C> {
     pub(super) spec: &'a PairSpec<C>,
 }
 
-/// What pairs of equal geoms have in common.
+/// Common data of pairs of equal geoms.
 #[derive(Clone, Debug)]
 pub(crate) struct PairSpec<C> {
-    /// Both geoms move.
+    /// Whether both geoms move.
     pub coupled: bool,
-    /// In MJCF's order, and zero where there is none: a sphere is a capsule without length.
+    /// In MJCF's order. Unused sizes are zero: a sphere is a capsule without length.
     pub sizes: [[C; 3]; 2],
     pub shapes: ShapePair,
-    /// Height field of the first.
+    /// Height field of the first geom.
     pub field: usize,
     pub cull: Cull,
     /// Distance beyond which they cannot touch: of the centers, or of the second's center from the plane.
@@ -106,12 +106,12 @@ pub(crate) struct PairSpec<C> {
     /// Regularized slope of an elliptic cone.
     pub slope: C,
     pub soft: Softness<C>,
-    /// Stiffness of the rows in units of the first row's.
+    /// Stiffness of the rows relative to the first row's.
     pub ratios: [C; 6],
 }
 
 impl<C> GeomPairOf<'_, C> {
-    /// The geom that moves, of a pair with the static world.
+    /// The moving geom of a pair with the static world.
     pub fn moving(&self) -> usize {
         self.geoms[if self.links[1].is_some() { 1 } else { 0 }]
     }
@@ -126,19 +126,19 @@ impl<C> std::ops::Deref for GeomPairOf<'_, C> {
 }
 
 impl<C> PairSpec<C> {
-    /// Contacts of a class share slots.
+    /// The class of a pair. Contacts of a class share slots.
     pub fn class(&self) -> (bool, usize) {
         (self.coupled, self.dim)
     }
 
-    /// Both are spheres or capsules.
+    /// Whether both are spheres or capsules.
     pub fn round(&self) -> bool {
         matches!(self.shapes, ShapePair::SphereSphere | ShapePair::SphereCapsule | ShapePair::CapsuleCapsule)
     }
 }
 
-/// Adds what pairs like this pair of geoms have in common. Returns false if their contacts are not simulated.
-/// Sets `hard` if the pair [is](is_hard).
+/// Adds the common data of pairs like this pair of geoms. Returns false if their contacts are not supported. Sets
+/// `hard` if the pair [is](is_hard).
 pub(super) fn add<T: Real>(
     model: &Model,
     mounts: &[BodyMount],
@@ -151,7 +151,7 @@ pub(super) fn add<T: Real>(
     let c = T::scalar;
     let [a, b] = geoms.map(|g| &model.geoms[g]);
     let Some(shapes) = ShapePair::of(a.kind, b.kind) else { return false };
-    // planes and fields that move are not simulated
+    // moving planes and fields are not supported
     if matches!(a.kind, GeomType::Plane | GeomType::Hfield) && links[0].is_some() {
         return false;
     }

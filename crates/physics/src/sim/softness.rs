@@ -1,10 +1,10 @@
-//! How hard a constraint is: the shape of its cost, and its impedance, which says how stiff it is at a given violation
+//! Softness of a constraint: the shape of its cost, and its impedance, which sets the stiffness at a given violation
 //! (MuJoCo documentation, "Solver parameters").
 
 use crate::lanes::Real;
 use crate::model::Model;
 
-/// How a block's cost depends on its row values.
+/// Dependence of a block's cost on its row values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Cost {
     /// One row that pushes while its value is negative.
@@ -33,11 +33,11 @@ pub(crate) struct Softness<C> {
     /// Normalizations of the two halves of the power curve.
     pub low_scale: C,
     pub high_scale: C,
-    /// `power` is 2 and the midpoint 1/2: the default, which needs no exponential.
+    /// Whether `power` is 2 and the midpoint 1/2: the default, which needs no exponential.
     pub quadratic: bool,
-    /// Violation is measured from here.
+    /// Distance from which the violation is measured.
     pub margin: C,
-    /// Approximate inverse inertia seen by the constraint.
+    /// Approximate inverse inertia for the constraint.
     pub diag: C,
 }
 

@@ -1,9 +1,9 @@
-//! What the kernels do not simulate is refused here by name, never ignored.
+//! Refuses by name what the kernels do not support.
 
 use super::options::SimError;
 use crate::model::{Actuator, Body, Integrator, Joint, JointType, Model, Tendon, TendonKind, Transmission};
 
-/// Refuses a model that would not be simulated as MuJoCo does. Contacts are checked where their list is made.
+/// Refuses a model that would not be simulated as in MuJoCo. Contacts are checked when their list is created.
 pub(crate) fn check(model: &Model) -> Result<(), SimError> {
     let refuse = |(what, remedy): (String, &str)| {
         Err(SimError::Unsupported { model: model.name.clone(), what, remedy: remedy.into() })

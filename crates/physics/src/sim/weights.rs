@@ -1,24 +1,23 @@
-//! Approximate inverse inertias that constraints between two bodies see.
+//! Approximate inverse inertias for constraints between two bodies.
 
 use super::weld::BodyMount;
 use crate::model::Model;
 
-/// Below this fraction of a body's other inverse inertia, one is nothing.
+/// Fraction of a body's other inverse inertia below which an inverse inertia counts as zero.
 const NOTHING: f64 = 1e-6;
 
-/// What is taken then, as such a fraction: where the softness of the constraint and its rounding in single precision are
-/// errors of a size.
+/// Fraction that replaces it. At this value, the softness of the constraint and its rounding error in single precision
+/// are of similar size.
 const LEAST: f64 = 1e-2;
 
-/// A constraint this much harder than what it acts on is hard for single precision.
+/// A constraint that is harder than its bodies by this factor is hard for single precision.
 const HARD: f64 = 1e-2;
 
-/// Inverse inertias that two bodies have against being moved apart and against being turned: the sums of MuJoCo's inverse
-/// weights.
+/// Inverse inertias of two bodies for separating and for rotating them: the sums of MuJoCo's inverse weights.
 ///
-/// A body that turns about its center of mass has no translational one, a body that slides no rotational one, and MuJoCo
-/// takes 1e-15 for them. Such a constraint is so hard that rounding decides, in MuJoCo too. Here it is as hard as single
-/// precision can hold.
+/// A body that only turns about its center of mass has no translational inverse inertia, and a sliding body no
+/// rotational one. MuJoCo uses 1e-15 instead. Such a constraint is so hard that rounding decides, in MuJoCo too. Here
+/// it is as hard as single precision allows.
 pub(crate) fn inverse_weights(model: &Model, mounts: &[BodyMount], bodies: [usize; 2]) -> [f64; 2] {
     [0, 1].map(|k| {
         let own: f64 = bodies.iter().map(|b| model.bodies[*b].invweight0[k]).sum();
@@ -27,7 +26,7 @@ pub(crate) fn inverse_weights(model: &Model, mounts: &[BodyMount], bodies: [usiz
     })
 }
 
-/// What an inverse weight would be of bodies that move in the other way as if they were free.
+/// An inverse weight estimated from that of the other kind of motion, as if the bodies were free.
 fn other_weight(model: &Model, mounts: &[BodyMount], bodies: [usize; 2], k: usize) -> f64 {
     let share = |b: &usize| {
         let (weight, spread) = (model.bodies[*b].invweight0[1 - k], mounts[*b].spread);
@@ -36,8 +35,8 @@ fn other_weight(model: &Model, mounts: &[BodyMount], bodies: [usize; 2], k: usiz
     bodies.iter().map(share).sum()
 }
 
-/// Whether a constraint on points of two bodies is much harder, by the inverse weight `diag` of its rows, than what a
-/// point of them weighs that moves and turns.
+/// Whether a constraint on points of two bodies, with the inverse weight `diag` of its rows, is much harder than the
+/// effective mass of such a point on free bodies.
 pub(crate) fn is_hard(model: &Model, mounts: &[BodyMount], bodies: [usize; 2], diag: f64) -> bool {
     let own: f64 = bodies.iter().map(|b| model.bodies[*b].invweight0[0]).sum();
     diag < HARD * (own + other_weight(model, mounts, bodies, 0))

@@ -1,4 +1,4 @@
-//! Bodies without joints are welded to the body that carries them: where they sit on it, and what they weigh together.
+//! Bodies without joints, which are welded to the body that carries them: their poses on it, and their total mass.
 
 use crate::algebra::rigid::{Frame, compose, quat_to_rot, rotate};
 use crate::model::{Model, Vec3};
@@ -8,13 +8,13 @@ pub(crate) struct BodyMount {
     pub body: usize,
     pub pos: Vec3,
     pub rot: [Vec3; 3],
-    /// Mean moment of inertia, about their center of mass, of all bodies that are welded together, by their mass: the
-    /// square of a length. Zero for what has no mass.
+    /// Mean moment of inertia of all bodies that are welded together, about their center of mass, divided by their
+    /// mass: a squared length. Zero without mass.
     pub spread: f64,
 }
 
-/// Where every body sits on its `weld_id`: the identity for bodies that move, world frames for static bodies and for
-/// mocap bodies with what is welded to them.
+/// Pose of every body on its `weld_id`: the identity for moving bodies, world frames for static bodies and for mocap
+/// bodies with everything welded to them.
 pub(crate) fn mounts(model: &Model) -> Vec<BodyMount> {
     let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mut out: Vec<BodyMount> = Vec::with_capacity(model.bodies.len());
@@ -62,7 +62,7 @@ pub(crate) struct Lump {
     pub inertia: [f64; 6],
 }
 
-/// Lumps the bodies welded to `link`.
+/// Combines the bodies welded to `link`.
 pub(crate) fn lump(model: &Model, mounts: &[BodyMount], link: usize) -> Lump {
     let parts: Vec<_> = (0..model.bodies.len()).filter(|&b| mounts[b].body == link).collect();
     let mass: f64 = parts.iter().map(|&b| model.bodies[b].mass).sum();

@@ -1,6 +1,6 @@
 //! The solver's stages over all [`Block`]s.
 //!
-//! Many models have none, so these are functions of their own: the solver's inner loop stays small.
+//! Many models have no blocks. Separate functions keep the solver's inner loop small.
 
 use crate::algebra::spatial::*;
 use crate::lanes::{Real, kernel_fn};
@@ -14,7 +14,7 @@ pub(super) fn any_coupled<T: Real>(work: &Work<T>) -> bool {
 }
 
 kernel_fn! {
-    /// Marks the links that are touched and recalls zones. Returns whether all zones are known thereby.
+    /// Marks the touched links and recalls zones. Returns whether all zones are known.
     pub(crate) fn recall<'a, T>(work: &'a mut Work<T>) -> bool {
         let Work { rows, past, solver, .. } = work;
         let mut known = true;
@@ -33,7 +33,7 @@ kernel_fn! {
 }
 
 kernel_fn! {
-    /// Values and zones at the warm start, where they are not recalled.
+    /// Values and zones at the warm start, for blocks without recalled zones.
     pub(crate) fn start<'a, T>(work: &'a mut Work<T>, known: bool) {
         for b in work.rows.blocks.iter_mut() {
             if !known {
@@ -98,7 +98,7 @@ fn add_to_links<T: Real, const N: usize>(
             let w = if j <= i { b.stiffness[at(i, j)] } else { b.stiffness[at(j, i)] };
             h = axpy6(&columns[j], -w, &h);
         }
-        // the sum over all rows is symmetric, and one triangle of it is what is kept
+        // the sum over all rows is symmetric, and only one triangle is stored
         sym6_sub_outer(&mut k, &columns[i], &h);
     }
     let w = b.total_wrench(&b.linear_force(&b.u0), &side.r);
@@ -115,7 +115,7 @@ fn add_to_links<T: Real, const N: usize>(
 }
 
 kernel_fn! {
-    /// Moves to the Newton point; lanes where some block's linear model does not hold there.
+    /// Moves to the Newton point. Returns lanes where some block's linear model does not hold there.
     pub(crate) fn newton_point<'a, T>(work: &'a mut Work<T>) -> T::Mask {
         let mut changed = T::none();
         for b in work.rows.blocks.iter_mut() {
@@ -179,7 +179,7 @@ kernel_fn! {
 }
 
 kernel_fn! {
-    /// True forces at the present point.
+    /// True forces at the current point.
     pub(crate) fn true_forces<'a, T>(work: &'a mut Work<T>) {
         for b in work.rows.blocks.iter_mut() {
             b.force = b.true_force(&b.u);
@@ -200,7 +200,7 @@ kernel_fn! {
 }
 
 kernel_fn! {
-    /// Puts the blocks' forces on links and joints.
+    /// Applies the blocks' forces to links and joints.
     pub(crate) fn apply_forces<'a, T>(work: &'a mut Work<T>) {
         for b in work.rows.blocks.iter() {
             b.exert(&mut work.solver.wrench, &mut work.solver.rhs);

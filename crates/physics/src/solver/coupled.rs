@@ -1,21 +1,21 @@
-//! Blocks that tie branches of the tree together.
+//! Blocks that connect branches of the tree.
 //!
-//! The articulated-body factors are those of `H0 = M + (what fits the tree)`. Blocks between moving bodies add
-//! `B' W B`, with few rows B (three per contact, and an agent has one or two such contacts; beyond
-//! [`MOST_COUPLED_ROWS`](crate::sim::MOST_COUPLED_ROWS) another factorization takes over, lane by lane). With `W = R' R` the
-//! matrix identity of Sherman, Morrison and Woodbury gives the exact Newton point from the factors of `H0`:
+//! The articulated-body factors are those of `H0 = M + (what fits the tree)`. Blocks between moving bodies add `B' W
+//! B`, with few rows B: three per contact, and an agent has one or two such contacts. Beyond
+//! [`MOST_COUPLED_ROWS`](crate::sim::MOST_COUPLED_ROWS), another factorization is used, lane by lane. With `W = R' R`,
+//! the matrix identity of Sherman, Morrison and Woodbury gives the exact Newton point from the factors of `H0`:
 //!
 //! `f = -R' (1 + R B inv(H0) B' R')^-1 R (B inv(H0) b + u0)`,  `a = inv(H0) (b + B' f)`.
 //!
-//! The recursion is `inv(H0) = P' D P`, P being the inward pass: so all that is needed of a row is its inward pass
-//! (a *column*, one number per degree of freedom), every product with `inv(H0)` is a sum over the degrees of freedom,
-//! and the correction is added to `drive` before the one outward pass that is needed anyway. The small matrix is at
-//! least the identity: its Cholesky factors always exist. In lanes without a block the column is zero and the
-//! factor's row that of the identity, so nothing changes there, to the bit.
+//! The recursion is `inv(H0) = P' D P`, where P is the inward pass. So only the inward pass of each row is needed (a
+//! *column*, one number per degree of freedom). Every product with `inv(H0)` is a sum over the degrees of freedom, and
+//! the correction is added to `drive` before the outward pass. The small matrix is at least the identity, so its
+//! Cholesky factors always exist. In lanes without a block the column is zero and the factor's row is that of the
+//! identity, so nothing changes there, to the bit.
 //!
-//! The alternatives: splitting `|j2 - j1|^2 <= 2 |j1|^2 + 2 |j2|^2` keeps the tree and needs no small matrix, but costs
-//! several times as many iterations; a dense factorization of H costs about twice the recursion before the first contact
-//! (`docs/physics.md` has the numbers).
+//! There are two alternatives. Splitting `|j2 - j1|^2 <= 2 |j1|^2 + 2 |j2|^2` keeps the tree and needs no small matrix,
+//! but costs several times as many iterations. A dense factorization of H costs about twice the recursion before the
+//! first contact (`docs/physics.md` has the numbers).
 
 use crate::algebra::planar::{Full, Planar, Space};
 use crate::algebra::spatial::V6;
@@ -26,7 +26,7 @@ use crate::sim::Sim;
 use crate::state::{Coupling, Solver, Work};
 
 kernel_fn! {
-    /// Computes the columns of all coupled blocks (`fresh`: the factors of the tree changed) and factorizes.
+    /// Computes the columns of all coupled blocks and factorizes. `fresh`: the factors of the tree changed.
     pub(crate) fn factorize<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, fresh: bool) {
         if sim.planar {
             factorize_in::<T, Planar>(sim, work, fresh);
@@ -40,7 +40,7 @@ kernel_fn! {
 fn factorize_in<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, fresh: bool) {
     let nv = sim.model.nv;
     let mut c = std::mem::replace(&mut work.solver.coupling, Coupling::new(0, 0));
-    // blocks of crowded lanes alone are left out: in the other lanes they are zero
+    // blocks that exist only in crowded lanes are skipped: in the other lanes they are zero
     let trees = T::not(work.solver.crowded);
     let corrects = |b: &Block<T>| b.coupled && (T::all(trees) || T::any(T::and(b.on, trees)));
     c.rows = work.rows.blocks.iter().filter(|b| corrects(b)).map(|b| b.dim).sum();
@@ -97,7 +97,7 @@ fn factorize_in<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, fresh: bool
 }
 
 kernel_fn! {
-    /// Corrects `drive` for the coupled blocks; `with_offset` at a Newton point, without for a residual.
+    /// Corrects `drive` for the coupled blocks: `with_offset` at a Newton point, without it for a residual.
     pub(crate) fn correct<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, with_offset: bool) {
         let nv = sim.model.nv;
         let Solver { coupling: c, drive, pivot, .. } = &mut work.solver;
@@ -177,7 +177,7 @@ fn inward<T: Real, S: Space>(
                 let w = block.wrench(k, &side.r);
                 for (link, lanes) in &side.links {
                     for i in 0..6 {
-                        // link forces are what the motion needs: minus what is applied
+                        // link forces are what the motion needs: the negative applied forces
                         let x = T::masked(*lanes, w[i]);
                         link_force[*link][i] += if s == 0 { x } else { -x };
                     }
@@ -224,7 +224,7 @@ fn scale_rows<T: Real>(block: &Block<T>, c: &mut Coupling<T>, first: usize, nv: 
         for k in 0..j {
             pivot = l[at(j, k)].neg_mul_add(l[at(j, k)], pivot);
         }
-        // what is left of a direction after rounding
+        // the remainder of a direction after rounding
         let enough = (block.stiffness[at(j, j)] * T::lit(8.0 * T::EPSILON)).lt(pivot);
         let root = T::masked(enough, pivot.max(z).sqrt());
         let inverse = T::masked(enough, T::select(enough, root, T::lit(1.0)).recip());

@@ -1,9 +1,9 @@
-//! Agents with many contacts between links ("crowds"): a sparse factorization instead of a correction of low rank.
+//! Agents with many contacts between links ("crowds"): a sparse factorization instead of a low-rank correction.
 //!
-//! For every degree of freedom, the correction of [`coupled`](super::coupled) costs the square of its rows. A pile of
-//! bodies has hundreds of rows, but they tie few pairs of links. Beyond
+//! For every degree of freedom, the cost of the correction of [`coupled`](super::coupled) grows with the square of its
+//! rows. A pile of bodies has hundreds of rows, but they connect few pairs of links. Beyond
 //! [`MOST_COUPLED_ROWS`](crate::sim::MOST_COUPLED_ROWS) rows an agent is solved by a factorization of the whole matrix
-//! `H = M + J' D J` ([`multifrontal`]). Neither the other stages of the solver nor the other lanes notice it.
+//! `H = M + J' D J` ([`multifrontal`]). This does not affect the other stages of the solver or the other lanes.
 
 use crate::algebra::spatial::*;
 use crate::lanes::{MAX_LANES, Real, kernel_fn};
@@ -43,7 +43,7 @@ kernel_fn! {
     }
 }
 
-/// Lists what ties the links of a lane together, and plans the factorization.
+/// Lists the connections between the links of a lane, and plans the factorization.
 #[inline(always)]
 fn prepare<T: Real>(sim: &Sim<T>, work: &mut Work<T>, lane: usize) {
     let Work { motion, solver, rows, .. } = work;
@@ -106,7 +106,7 @@ fn prepare<T: Real>(sim: &Sim<T>, work: &mut Work<T>, lane: usize) {
 }
 
 kernel_fn! {
-    /// Factorizes the system of the lanes `lanes`: what changed of it since their last factorization, by
+    /// Factorizes the system of the lanes `lanes`. Only recomputes the changes since their last factorization, by
     /// `stale` and [`Block::moved`].
     pub(crate) fn factorize<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, lanes: T::Mask) {
         let bits = T::bits(lanes);
@@ -158,9 +158,8 @@ kernel_fn! {
 }
 
 kernel_fn! {
-    /// Solves for the forces of the present system in the lanes `lanes`, into `solution`
-    /// and `link_acc`; without the blocks' and the motion's forces for a residual,
-    /// whose forces on links are in `link_force`.
+    /// Solves for the forces of the current system in the lanes `lanes`, into `solution` and `link_acc`. For a
+    /// residual, the forces on links are in `link_force`, and the forces of blocks and motion are left out.
     pub(crate) fn solve<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, lanes: T::Mask, residual: bool) {
         let bits = T::bits(lanes);
         for lane in (0..T::LANES).filter(|lane| bits >> lane & 1 == 1) {

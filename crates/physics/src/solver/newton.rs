@@ -9,7 +9,7 @@ use crate::rows::NewtonStep;
 use crate::sim::Sim;
 use crate::state::{Group, Work, net_bias_force};
 
-/// Solves for the constrained acceleration, into `acc`; rows end with their true forces.
+/// Solves for the constrained acceleration, into `acc`. Rows end with their true forces.
 #[inline(always)]
 pub(crate) fn solve<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     start::<T, S>(sim, group, work);
@@ -40,7 +40,7 @@ pub(crate) fn solve<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mu
             advance(sim, work, &NewtonStep { done, exact, alpha: T::lit(1.0), last: exact });
             done = T::or(done, exact);
         } else if iteration == 1 {
-            // the warm start only chose the active set: its accelerations obey no identity, take the whole step
+            // the warm start only selects the active set and satisfies no identity: take the whole step
             advance(sim, work, &NewtonStep { done, exact: T::not(T::none()), alpha: T::lit(1.0), last: exact });
             done = exact;
         } else {
@@ -96,7 +96,7 @@ pub(super) fn solve_system<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, 
     }
 }
 
-/// Active sets to start from: those of the evaluation before where there was one, else those at the warm start.
+/// Initial active sets: those of the previous evaluation if there was one, else those at the warm start.
 #[inline(always)]
 fn start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     work.solver.stale.fill(true);
@@ -123,7 +123,7 @@ fn start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) 
     }
 }
 
-/// Row values at the warm start, and the active sets of rows that are new.
+/// Row values at the warm start, and the active sets of new rows.
 #[inline(always)]
 fn warm_start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     for d in 0..sim.model.nv {
@@ -147,7 +147,7 @@ fn warm_start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
     }
 }
 
-/// Stiffness and right-hand side of the present active set, for the links where it changed.
+/// Stiffness and right-hand side of the current active set, for the links where it changed.
 #[inline(always)]
 pub(super) fn assemble<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     let z = T::zero();
@@ -193,7 +193,7 @@ pub(super) fn assemble<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     }
 }
 
-/// Row values at the Newton point; lanes whose active set differs there from the one that was solved with.
+/// Row values at the Newton point. Returns lanes whose active set there differs from that of the solve.
 #[inline(always)]
 fn newton_point<T: Real>(work: &mut Work<T>) -> T::Mask {
     let mut changed = T::none();
@@ -232,7 +232,7 @@ fn advance<T: Real>(sim: &Sim<T>, work: &mut Work<T>, step: &NewtonStep<T>) {
     }
 }
 
-/// Every row's true force at the present point.
+/// The true force of every row at the current point.
 #[inline(always)]
 fn true_forces<T: Real>(work: &mut Work<T>) {
     for c in work.rows.contacts.iter_mut() {
@@ -249,9 +249,9 @@ fn true_forces<T: Real>(work: &mut Work<T>) {
     }
 }
 
-/// One step of iterative refinement: the equation of motion's residual, evaluated link by link, solved for with the
-/// matrix of the last iteration. It takes the rounding of stiff contacts out of single precision for little cost.
-/// Only for lanes in `arrived`: the matrix is that of their active set.
+/// One step of iterative refinement: evaluates the residual of the equation of motion link by link, and solves for it
+/// with the matrix of the last iteration. It removes most of the rounding error of stiff contacts in single precision
+/// at low cost. Only for lanes in `arrived`, because the matrix is that of their active set.
 #[inline(always)]
 fn refine<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, arrived: T::Mask, coupled: bool) {
     for d in 0..sim.model.nv {
@@ -300,7 +300,7 @@ fn refine<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, arrived: T::Mask,
     true_forces(work);
 }
 
-/// Puts the constraint forces on the right-hand side: contact wrenches on links, limit and friction forces on joints.
+/// Adds the constraint forces to the right-hand side: contact wrenches on links, limit and friction forces on joints.
 #[inline(always)]
 pub(crate) fn apply_forces<T: Real, S: Space>(work: &mut Work<T>) {
     for l in 0..work.solver.wrench.len() {

@@ -1,4 +1,4 @@
-//! The line search: where the cost is least along the segment to the Newton point.
+//! The line search: the minimum of the cost along the segment to the Newton point.
 
 use super::blocks;
 use crate::lanes::Real;
@@ -6,23 +6,23 @@ use crate::rows::Row;
 use crate::sim::Sim;
 use crate::state::Work;
 
-/// Longest way of a line search in units of the Newton step. The minimum is hardly ever beyond a few; where it is, the
-/// next iteration goes on.
+/// Maximum length of a line search in Newton steps. The minimum is rarely beyond a few; the next iteration continues if
+/// it is.
 const LONGEST_SEARCH: f64 = 64.0;
 
-/// Slope left over by the line search, as a fraction of the slope at its start. In the first iterations a rough search
-/// serves as well as an exact one: the number of iterations is the same and the searches are half as long.
+/// Fraction of the initial slope at which the line search stops. In the first iterations a rough search works as well
+/// as an exact one: the number of iterations is the same, and the searches are half as long.
 const ROUGH: f64 = 0.6;
 const EXACT: f64 = 0.01;
 /// Iterations with the rough search.
 const ROUGH_ITERATIONS: usize = 8;
 
-/// Returns the fraction of the way and the lanes whose predicted improvement is below the tolerance (at fraction 1).
-/// Lanes in `skip` do not matter.
+/// Returns the fraction of the segment, and the lanes whose predicted improvement is below the tolerance (at fraction
+/// 1). Lanes in `skip` do not matter.
 #[inline(always)]
 pub(super) fn line_search<T: Real>(sim: &Sim<T>, work: &mut Work<T>, skip: T::Mask, iteration: usize) -> (T, T::Mask) {
     let (z, one) = (T::zero(), T::lit(1.0));
-    // interpolated forces against the direction at both ends, and the true forces at the start
+    // interpolated forces along the negative direction at both ends, and the true forces at the start
     let mut sums = [z; 3];
     for row in &work.rows.contacts {
         add(&mut sums, &row.ends());
@@ -38,7 +38,7 @@ pub(super) fn line_search<T: Real>(sim: &Sim<T>, work: &mut Work<T>, skip: T::Ma
     }
     let [g0, g1, f0] = sums;
     let descent = f0 - g0;
-    // an improvement below the rounding of its two parts is noise: searching along it leads anywhere
+    // an improvement below the rounding of its two parts is noise, and a search along it is arbitrary
     let noise = (f0.abs() + g0.abs()) * T::lit(4.0 * T::EPSILON);
     let small = descent.lt(noise.max(T::splat(sim.tolerance)));
     let fraction = if iteration <= ROUGH_ITERATIONS { ROUGH } else { EXACT };
@@ -69,8 +69,8 @@ pub(super) fn line_search<T: Real>(sim: &Sim<T>, work: &mut Work<T>, skip: T::Ma
         if T::all(settled) || step + 1 == sim.max_line_search {
             break;
         }
-        // Newton step in one dimension; where it leaves the bracket, doubling up to the first point beyond the minimum
-        // and bisection after it
+        // one-dimensional Newton step; if it leaves the bracket, doubling up to the first point beyond the minimum and
+        // bisection after that
         let short = slope.lt(z);
         low = T::select(short, alpha, low);
         high = T::select(short, high, alpha);

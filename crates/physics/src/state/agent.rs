@@ -8,24 +8,24 @@ use crate::model::Model;
 use crate::sim::Sim;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Everything an agent's future depends on. It is exact: numbers are written to files by their bits, so that even what
-/// is not a number survives.
+/// Everything that an agent's future depends on. The copy is exact: files store the bits of numbers, so that even NaN
+/// survives.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct AgentState {
     /// Configuration, velocity, controls and activations in MuJoCo's layout, then the solver's warm start.
     #[serde(serialize_with = "to_bits", deserialize_with = "from_bits")]
     numbers: Vec<f64>,
-    /// Torque and force on every body from outside; empty: none.
+    /// External torque and force on every body; empty for none.
     #[serde(serialize_with = "to_bits", deserialize_with = "from_bits")]
     pushes: Vec<f64>,
-    /// Constants of its own.
+    /// The agent's own constants.
     variation: Option<Variation>,
-    /// Elevations of its own, m, by height field.
+    /// The agent's own elevations, m, by height field.
     grounds: Vec<Option<Vec<f32>>>,
 }
 
 impl AgentState {
-    /// Whether it has the sizes of a state of this model. One that has not cannot be put into a `Batch`.
+    /// Whether its sizes fit this model. Otherwise it cannot be loaded into a `Batch`.
     pub fn fits(&self, model: &Model) -> bool {
         let Model { nq, nv, nu, na, bodies, .. } = model;
         let varied = |v: &Variation| v.mass.len() == bodies.len() && v.strength.len() == *nu;
@@ -40,7 +40,7 @@ impl AgentState {
             && self.grounds.iter().enumerate().all(grid)
     }
 
-    /// Appends the state's bytes; [`read_from`](AgentState::read_from) is the way back.
+    /// Appends the state's bytes. [`read_from`](AgentState::read_from) is the inverse.
     pub fn write_to(&self, bytes: &mut Vec<u8>) {
         let AgentState { numbers, pushes, variation, grounds } = self;
         let own = [(PUSHED, !pushes.is_empty()), (VARIED, variation.is_some()), (GROUNDED, !grounds.is_empty())];
@@ -56,8 +56,8 @@ impl AgentState {
         }
     }
 
-    /// Reads a state of an agent of this model, which [`write_to`](AgentState::write_to) has written, and returns it with
-    /// the bytes that follow. `None` if there is none.
+    /// Reads the state of an agent of this model from bytes of [`write_to`](AgentState::write_to). Returns it with the
+    /// remaining bytes. `None` if the bytes are invalid.
     pub fn read_from<'a>(model: &Model, bytes: &'a [u8]) -> Option<(Self, &'a [u8])> {
         let Model { nq, nv, nu, na, bodies, hfields, .. } = model;
         let (own, mut bytes) = bytes.split_first()?;
@@ -89,12 +89,12 @@ impl AgentState {
     }
 }
 
-/// What an agent has of its own, a bit each.
+/// Optional parts of a state, one bit each.
 const PUSHED: u8 = 1;
 const VARIED: u8 = 2;
 const GROUNDED: u8 = 4;
 
-/// Takes so many numbers off the front of some bytes.
+/// Takes `count` numbers from the front of some bytes.
 fn take<const N: usize, X>(bytes: &mut &[u8], count: usize, number: fn([u8; N]) -> X) -> Option<Vec<X>> {
     let (mine, rest) = bytes.split_at_checked(count.checked_mul(N)?)?;
     *bytes = rest;
@@ -102,7 +102,7 @@ fn take<const N: usize, X>(bytes: &mut &[u8], count: usize, number: fn([u8; N]) 
 }
 
 impl PartialEq for AgentState {
-    /// Equal to the bit.
+    /// Bitwise equality.
     fn eq(&self, other: &Self) -> bool {
         let same =
             |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
@@ -122,7 +122,7 @@ fn from_bits<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::
 }
 
 impl<T: Real> Group<T> {
-    /// Copies an agent's state out of its lane. It does not tell what the agents of other lanes have of their own.
+    /// Copies an agent's state out of its lane. It does not depend on other lanes.
     pub fn save(&self, sim: &Sim<T>, lane: usize) -> AgentState {
         let get = |x: &T| T::widen(x.get(lane));
         let parts = [&self.qpos, &self.qvel, &self.ctrl, &self.act, &self.qacc_warmstart];
@@ -145,10 +145,10 @@ impl<T: Real> Group<T> {
         }
     }
 
-    /// The constants of an agent, if they are not the model's.
+    /// The constants of an agent, if they differ from the model's.
     fn deviation(&self, sim: &Sim<T>, lane: usize) -> Option<Variation> {
         let (own, none) = (self.variation(sim, lane), Variation::none(&sim.model));
-        // as far as the lanes can tell
+        // compared in the precision of the lanes
         let all = |v: &Variation| [&v.mass[..], &[v.friction], &v.strength, &v.gravity].concat();
         let same = |(own, none): (&f64, &f64)| T::scalar(*own) == T::scalar(*none);
         (!all(&own).iter().zip(&all(&none)).all(same)).then_some(own)
@@ -161,8 +161,8 @@ impl<T: Real> Group<T> {
     pub fn load(&mut self, sim: &Sim<T>, lane: usize, state: &AgentState) {
         let bodies = sim.model.bodies.len();
         let size = self.qpos.len() + self.qvel.len() + self.ctrl.len() + self.act.len() + self.qacc_warmstart.len();
-        assert_eq!(state.numbers.len(), size, "a state of the same model");
-        assert!(state.pushes.is_empty() || state.pushes.len() == 6 * bodies, "a state of the same model");
+        assert_eq!(state.numbers.len(), size, "expected a state of the same model");
+        assert!(state.pushes.is_empty() || state.pushes.len() == 6 * bodies, "expected a state of the same model");
         let parts = [&mut self.qpos, &mut self.qvel, &mut self.ctrl, &mut self.act, &mut self.qacc_warmstart];
         for (x, s) in parts.into_iter().flatten().zip(&state.numbers) {
             x.set(lane, T::scalar(*s));
@@ -170,7 +170,7 @@ impl<T: Real> Group<T> {
         if self.xfrc_applied.is_empty() && !state.pushes.is_empty() {
             self.xfrc_applied = vec![[T::zero(); 6]; bodies];
         }
-        // an agent that was not pushed when it was saved is not pushed now
+        // clears the pushes of an agent that was saved without any
         let pushes = state.pushes.iter().copied().chain(std::iter::repeat(0.0));
         for (x, s) in self.xfrc_applied.iter_mut().flatten().zip(pushes) {
             x.set(lane, T::scalar(s));

@@ -1,24 +1,24 @@
-//! How far pairs are from touching, remembered from one evaluation of the forces to the next.
+//! Clearances of pairs, kept from one evaluation of the forces to the next.
 //!
-//! Between evaluations geoms move by millimeters, and most pairs are apart by much more: a pair that was tested is left
-//! alone until its two geoms together have moved as far as they were apart. That is on the safe side, so contacts are
-//! the same, to the bit, as if every pair were tested every time.
+//! Between evaluations geoms move by millimeters, and most pairs are much farther apart. A tested pair is skipped until
+//! its two geoms together have moved as far as they were apart. This is conservative, so contacts are the same, to the
+//! bit, as if every pair were tested every time.
 //!
-//! What is remembered belongs to one group of agents, see [`Work::continues`](super::Work::continues).
+//! The clearances belong to one group of agents, see [`Work::continues`](super::Work::continues).
 
 use crate::algebra::spatial::*;
 use crate::lanes::Real;
 
-/// Distance at which a pair counts as touching already, as a fraction of its reach: far above the rounding of distances
-/// and ways.
+/// Distance at which a pair counts as touching, as a fraction of its reach: far above the rounding of distances and
+/// movements.
 const SAFETY: f64 = 1e-3;
 
-/// What is known of all pairs. Ways and distances are relative to the tree that both geoms belong to.
+/// Clearances of all pairs. Movements and distances are relative to the tree that both geoms belong to.
 #[derive(Clone, Debug)]
 pub(crate) struct Clearances<T: Real> {
-    /// Per geom: the longest way of any of its points since the beginning, m.
+    /// Per geom: the longest movement of any of its points since the start, m.
     ways: Vec<T>,
-    /// Per pair: sum of both geoms' ways up to which they cannot touch.
+    /// Per pair: sum of both geoms' movements up to which they cannot touch.
     safe: Vec<T>,
 }
 
@@ -27,16 +27,16 @@ impl<T: Real> Clearances<T> {
         Clearances { ways: vec![T::zero(); geoms], safe: vec![T::zero(); pairs] }
     }
 
-    /// Forgets everything.
+    /// Clears everything.
     #[inline(always)]
     pub fn forget(&mut self) {
         self.ways.fill(T::zero());
-        // no sum of ways is below this
+        // no sum of movements is below this
         self.safe.fill(T::lit(-1.0));
     }
 
-    /// A geom's center moved by `shift` and its axis by `turn`; `half` is the length of the geom on either side along the
-    /// axis. No point of a capsule moves further than the farther of its ends.
+    /// Records that a geom's center moved by `shift` and its axis by `turn`. `half` is the half length of the geom
+    /// along the axis. No point of a capsule moves farther than one of its ends.
     #[inline(always)]
     pub fn follow(&mut self, geom: usize, shift: &V3<T>, turn: &V3<T>, half: T) {
         let along = (half * dot(shift, turn)).abs();
@@ -51,14 +51,14 @@ impl<T: Real> Clearances<T> {
         T::all((self.ways[geoms[0]] + self.ways[geoms[1]]).lt(self.safe[pair]))
     }
 
-    /// A pair was found to be `clearance` from touching, see [`clearance`].
+    /// Records that a pair is `clearance` from touching, see [`clearance`].
     #[inline(always)]
     pub fn remember(&mut self, pair: usize, geoms: [usize; 2], clearance: T) {
         self.safe[pair] = self.ways[geoms[0]] + self.ways[geoms[1]] + clearance;
     }
 }
 
-/// How far a pair is from touching that is apart by `distance` beyond its margin: less than nothing where it may touch.
+/// Distance of a pair from touching, if `distance` is its distance beyond the margin. Negative if it may touch.
 #[inline(always)]
 pub(crate) fn clearance<T: Real>(distance: T, reach: T) -> T {
     reach.neg_mul_add(T::lit(SAFETY), distance)

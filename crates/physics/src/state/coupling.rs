@@ -1,4 +1,4 @@
-//! Memory of the correction for blocks that tie branches of a tree together.
+//! Memory of the correction for blocks that connect branches of the tree.
 
 use crate::algebra::spatial::V6;
 use crate::lanes::Real;

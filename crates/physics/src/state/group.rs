@@ -7,10 +7,10 @@ use crate::model::JointType;
 use crate::sim::Sim;
 use std::sync::Arc;
 
-/// Largest sound position, velocity or acceleration.
+/// Largest valid position, velocity or acceleration.
 const LARGEST: f64 = 1e10;
 
-/// State of `T::LANES` agents that share a model: everything their future depends on.
+/// State of `T::LANES` agents that share a model: everything that their future depends on.
 #[derive(Clone, Debug)]
 pub struct Group<T: Real> {
     /// Configuration in MuJoCo's layout, one entry per coordinate.
@@ -21,17 +21,17 @@ pub struct Group<T: Real> {
     pub ctrl: Vec<T>,
     /// Activations of the actuators that have one.
     pub act: Vec<T>,
-    /// Acceleration of the last step: where the constraint solver starts from.
+    /// Acceleration of the last step, the start of the constraint solver.
     pub qacc_warmstart: Vec<T>,
-    /// Torque and force on every body from outside, world axes, at its center of mass; empty: none. Kept until changed.
+    /// External torque and force on every body, world axes, at its center of mass; empty for none. Kept until changed.
     pub xfrc_applied: Vec<V6<T>>,
     /// Constants that differ from the model's.
     pub(crate) varied: Option<Box<Varied<T>>>,
-    /// Height fields that differ from the model's: field by field, lane by lane; empty: none.
+    /// Height fields that differ from the model's, by field and lane; empty for none.
     pub(crate) grounds: Vec<Option<Arc<HeightField<T::Scalar>>>>,
 }
 
-/// What the agents of a group have of their own in place of the model's constants.
+/// An agent's own constants in place of the model's.
 #[derive(Clone, Debug)]
 pub(crate) struct Varied<T: Real> {
     /// Per link.
@@ -43,7 +43,7 @@ pub(crate) struct Varied<T: Real> {
 }
 
 impl<T: Real> Group<T> {
-    /// All agents in the reference configuration, at rest.
+    /// Creates agents in the reference configuration, at rest.
     pub fn new(sim: &Sim<T>) -> Self {
         let m = &sim.model;
         let zero = T::zero();
@@ -59,7 +59,7 @@ impl<T: Real> Group<T> {
         }
     }
 
-    /// Pushes a body of one agent until told otherwise: force, N, and torque, N m, in world axes at its center of mass.
+    /// Pushes a body of one agent until changed: force, N, and torque, N m, in world axes at its center of mass.
     ///
     /// # Panics
     /// If the body does not exist.
@@ -73,7 +73,8 @@ impl<T: Real> Group<T> {
         }
     }
 
-    /// Puts one agent into a state; its controls, activations, pushes and warm start are cleared. Quaternions are normalized.
+    /// Sets the state of one agent. Clears its controls, activations, pushes and warm start. Quaternions are
+    /// normalized.
     ///
     /// # Panics
     /// If a slice's length is not the model's `nq` or `nv`.
@@ -110,8 +111,8 @@ impl<T: Real> Group<T> {
         }
     }
 
-    /// Lanes whose state is sound: finite, and with positions, velocities and accelerations below 1e10, MuJoCo's bound
-    /// too. Far beyond it products overflow, and then even what a mask makes zero is not.
+    /// Lanes with a valid state: finite, with positions, velocities and accelerations below 1e10, which is also
+    /// MuJoCo's bound. Far beyond that, products overflow, and even masked zeros become NaN.
     pub fn finite(&self) -> T::Mask {
         let mut sum = T::zero();
         for x in &self.act {

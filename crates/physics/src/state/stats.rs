@@ -1,6 +1,6 @@
 //! Counts of the constraint solver's work.
 
-/// Counts of the constraint solver's work, summed over steps since the work was made.
+/// Counts of the constraint solver's work, summed over steps since the `Work` was created.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SolverStats {
     /// Solves of a lane group.
@@ -17,11 +17,11 @@ pub struct SolverStats {
     pub contacts: u64,
     /// Contacts in the union of a group's lanes.
     pub contact_rows: u64,
-    /// Pairs of geoms looked at, of lane groups.
+    /// Tested pairs of geoms, of lane groups.
     pub pairs: u64,
-    /// Factorizations of single agents in which much touches much, instead of by lane groups.
+    /// Factorizations of single crowded agents instead of lane groups.
     pub crowded: u64,
-    /// Entries of the factors that they computed: what they cost.
+    /// Entries of their computed factors, a measure of their cost.
     pub entries: u64,
 }
 
@@ -40,7 +40,7 @@ impl SolverStats {
         self.entries += other.entries;
     }
 
-    /// Takes earlier counts away (the largest iteration count stays).
+    /// Subtracts earlier counts (the largest iteration count stays).
     pub(crate) fn subtract(&mut self, earlier: &SolverStats) {
         self.solves -= earlier.solves;
         self.newton -= earlier.newton;

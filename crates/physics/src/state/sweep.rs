@@ -3,7 +3,7 @@
 use crate::algebra::spatial::V3;
 use crate::lanes::Real;
 
-/// Boxes of a group of agents, and the pairs found; the memory is kept from step to step.
+/// Boxes of a group of agents, and the found pairs. The memory is reused from step to step.
 #[derive(Clone, Debug)]
 pub(crate) struct Sweep<S> {
     /// By geom and by group: least and largest coordinates.
@@ -11,9 +11,9 @@ pub(crate) struct Sweep<S> {
     pub groups: Vec<[V3<S>; 2]>,
     /// Groups along the axis.
     pub order: Vec<usize>,
-    /// Geoms of two groups that reach into the box of the other.
+    /// Geoms of two groups that reach into the box of the other group.
     pub reaching: Vec<bool>,
-    /// Numbers of the pairs whose boxes overlap, ascending.
+    /// Indices of the pairs with overlapping boxes, ascending.
     pub found: Vec<u32>,
 }
 
@@ -29,7 +29,7 @@ impl<S: Real> Sweep<S> {
     }
 }
 
-/// A box that holds nothing.
+/// An empty box.
 #[inline(always)]
 pub(crate) fn nowhere<S: Real>() -> [V3<S>; 2] {
     [[S::lit(f64::INFINITY); 3], [S::lit(f64::NEG_INFINITY); 3]]

@@ -1,6 +1,6 @@
-//! What one agent has of its own: masses, friction, strength, gravity, ground.
+//! The own constants of an agent: masses, friction, strength, gravity, ground.
 //!
-//! A model's constants are shared by all agents; for domain randomization each may deviate from them. As in MuJoCo when
+//! All agents share a model's constants. For domain randomization each may deviate from them. As in MuJoCo when
 //! `mjModel` is edited in place, the regularization of constraints (`invweight0`) stays that of the model.
 
 use super::group::{Group, Varied};
@@ -15,8 +15,8 @@ use std::sync::Arc;
 /// One agent's deviations from the model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Variation {
-    /// Factor of every body's mass and inertia, one per body. Bodies without joints weigh as the body that they are
-    /// welded to says.
+    /// Factor of every body's mass and inertia, one per body. Bodies without joints use the factor of the body that
+    /// they are welded to.
     pub mass: Vec<f64>,
     /// Factor of all friction coefficients of contacts.
     pub friction: f64,
@@ -39,7 +39,7 @@ impl Variation {
 }
 
 impl<T: Real> Group<T> {
-    /// Gives an agent constants of its own, until changed; a reset keeps them.
+    /// Sets an agent's own constants, until changed. They survive a reset.
     ///
     /// # Panics
     /// If the number of masses or strengths is not the model's number of bodies or actuators.
@@ -103,8 +103,8 @@ impl<T: Real> Group<T> {
         self.varied.as_ref().map(|v| v.friction)
     }
 
-    /// Gives an agent ground of its own: the elevations (m, from the height field's zero) of height field `field`, row by
-    /// row as the model has them. It stays until changed.
+    /// Sets an agent's own ground: the elevations (m, from the height field's zero) of height field `field`, row by row
+    /// as in the model. It stays until changed.
     ///
     /// # Panics
     /// If there is no such field, or the number of elevations is not that of its grid.

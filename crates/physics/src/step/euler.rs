@@ -1,4 +1,4 @@
-//! Semi-implicit Euler: velocities at the end of the step, and positions along them.
+//! Semi-implicit Euler: new velocities, and positions that move with them.
 
 use crate::algebra::spatial::{V3, integrate_quat};
 use crate::dynamics::advance_activations;
@@ -8,7 +8,7 @@ use crate::sim::Sim;
 use crate::state::{Group, Work};
 
 kernel_fn! {
-    /// Moves the state along the acceleration that the forces cause at the beginning of the step.
+    /// Advances the state with the acceleration at the start of the step.
     pub(super) fn euler<'a, T>(sim: &'a Sim<T>, group: &'a mut Group<T>, work: &'a mut Work<T>) {
         integrate(sim, group, work, &work.solver.qacc);
     }
@@ -26,7 +26,7 @@ pub(super) fn integrate<T: Real>(sim: &Sim<T>, group: &mut Group<T>, work: &Work
     integrate_positions(sim, &mut group.qpos, &group.qvel, dt);
 }
 
-/// `qpos` moved along `qvel` for `h` seconds; quaternions stay normalized.
+/// Moves `qpos` along `qvel` for `h` seconds. Quaternions stay normalized.
 #[inline(always)]
 pub(super) fn integrate_positions<T: Real>(sim: &Sim<T>, qpos: &mut [T], qvel: &[T], h: T) {
     for joint in &sim.joints {

@@ -21,7 +21,7 @@ fn fwd_velocity<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     velocities(sim, group, work);
 }
 
-/// Springs and dampers of joints and tendons, which MuJoCo counts to `fwd_velocity`.
+/// Springs and dampers of joints and tendons, which MuJoCo assigns to `fwd_velocity`.
 #[inline(always)]
 fn passive<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     measure_tendons(sim, group, work);
@@ -35,7 +35,7 @@ fn fwd_actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     actuation(sim, group, work);
 }
 
-// stages that always follow each other share a kernel, which small models feel
+// stages that always follow each other share a kernel, which speeds up small models
 kernel_fn! {
     /// Positions and velocities of bodies.
     fn motion<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
@@ -90,7 +90,7 @@ kernel_fn! {
     }
 }
 
-/// A part of [`Sim::forward`]; public for the benchmark of the stages alone.
+/// A part of [`Sim::forward`]. Public for benchmarks of single stages.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub enum Stage {
@@ -103,13 +103,14 @@ pub enum Stage {
 }
 
 impl<T: Real> Sim<T> {
-    /// Accelerations and constraint forces at the present state; the state does not change.
+    /// Computes accelerations and constraint forces at the current state. The state does not change.
     pub fn forward(&self, work: &mut Work<T>, group: &Group<T>) {
         work.continues = false;
         self.forward_again(work, group);
     }
 
-    /// The same, of a group that was advanced a little since the last evaluation if [`Work::continues`] says so.
+    /// Like [`Sim::forward`], for a group that was advanced a little since the last evaluation if [`Work::continues`]
+    /// says so.
     pub(super) fn forward_again(&self, work: &mut Work<T>, group: &Group<T>) {
         self.smooth(work, group);
         self.make_constraint(work, group);
@@ -117,7 +118,7 @@ impl<T: Real> Sim<T> {
         work.continues = true;
     }
 
-    /// One part of [`Sim::forward`], after those before it.
+    /// One part of [`Sim::forward`], after the parts before it.
     #[doc(hidden)]
     pub fn run_stage(&self, stage: Stage, work: &mut Work<T>, group: &Group<T>) {
         work.continues = false;
@@ -159,12 +160,12 @@ impl<T: Real> Sim<T> {
         }
     }
 
-    /// Recomputes positions and velocities of bodies at the present state.
+    /// Recomputes positions and velocities of bodies at the current state.
     pub fn refresh(&self, work: &mut Work<T>, group: &Group<T>) {
         motion(self, group, work);
     }
 
-    /// The same, and the forces of the actuators there.
+    /// Like [`Sim::refresh`], including the forces of the actuators.
     pub(crate) fn refresh_actuators(&self, work: &mut Work<T>, group: &Group<T>) {
         self.refresh(work, group);
         joint_forces(self, group, work);

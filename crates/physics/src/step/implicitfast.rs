@@ -1,5 +1,5 @@
-//! Euler's method with forces taken at the end of the step: joint damping, and with `integrator="implicitfast"` every force
-//! of actuators that depends on velocity.
+//! Euler's method with some forces taken at the end of the step: joint damping, and with `integrator="implicitfast"`
+//! every velocity-dependent actuator force.
 
 use super::euler::integrate;
 use crate::algebra::planar::{Full, Planar, Space};
@@ -65,8 +65,8 @@ fn implicit_damping<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     }
 }
 
-/// The same from the accelerations, without the forces, with the factors at hand: `(M + dt B) (a' - a) = -dt B a`. The forces of
-/// links that [`gyroscope`] solves for stay in `rhs`.
+/// The same from the accelerations, without the forces, with the existing factors: `(M + dt B) (a' - a) = -dt B a`. The
+/// forces of links that [`gyroscope`] solves for stay in `rhs`.
 #[inline(always)]
 fn damp<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     let dt = T::splat(sim.dt);
@@ -85,10 +85,10 @@ fn damp<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     }
 }
 
-/// Solves for the acceleration of a free body, into `solution`, with the bias force too taken at the end of the step.
+/// Solves for the acceleration of a free body, into `solution`, with the bias force at the end of the step, too.
 ///
-/// With the first moment m c and the inertia J about the body's origin, the bias is `w x (w x m c)` and `w x J w`; its
-/// derivative is not symmetric, so this body is solved for on its own (MuJoCo documentation, "Integrators").
+/// With the first moment m c and the inertia J about the body's origin, the bias is `w x (w x m c)` and `w x J w`. Its
+/// derivative is not symmetric, so this body is solved separately (MuJoCo documentation, "Integrators").
 #[inline(always)]
 fn gyroscope<T: Real>(sim: &Sim<T>, work: &mut Work<T>, l: usize) {
     let (d, dt) = (sim.links[l].dofs.start, T::splat(sim.dt));
@@ -103,13 +103,13 @@ fn gyroscope<T: Real>(sim: &Sim<T>, work: &mut Work<T>, l: usize) {
             wrench[i] -= work.solver.wrench[l][i];
         }
     }
-    // torques are given along the body's axes
+    // torques are along the body's axes
     let axes = [ang(&work.motion.axis[d + 3]), ang(&work.motion.axis[d + 4]), ang(&work.motion.axis[d + 5])];
     let torque =
         sub3(&rotate(&axes, &[work.solver.rhs[d + 3], work.solver.rhs[d + 4], work.solver.rhs[d + 5]]), &ang(&wrench));
     let force = sub3(&[work.solver.rhs[d], work.solver.rhs[d + 1], work.solver.rhs[d + 2]], &lin(&wrench));
     let (mass, along) = ((m + work.solver.diag[d]).recip(), dot(&w, &moment));
-    // what turning by `w` changes, column by column: the force, and the torque about the origin
+    // derivative with respect to `w`, column by column: of the force, and of the torque about the origin
     let mut columns = [[T::zero(); 3]; 3];
     let mut pulls = [[T::zero(); 3]; 3];
     for k in 0..3 {
@@ -126,7 +126,7 @@ fn gyroscope<T: Real>(sim: &Sim<T>, work: &mut Work<T>, l: usize) {
         }
         pull[k] = along.mul_add(dt, pull[k]);
         column[k] += work.solver.diag[d + 3 + k];
-        // the origin gives way
+        // eliminate the acceleration of the origin
         let arm = cross(&moment, &pull);
         for i in 0..3 {
             column[i] = (arm[i] * mass).neg_mul_add(T::lit(1.0), column[i]);

@@ -13,18 +13,18 @@ use crate::sim::Sim;
 use crate::state::{Group, Work};
 
 impl<T: Real> Sim<T> {
-    /// Advances every agent of a group by `substeps` steps with its present controls, then brings the readings
-    /// (positions and velocities) up to date.
+    /// Advances every agent of a group by `substeps` steps with its current controls, then updates the readings
+    /// (positions and velocities).
     pub fn step(&self, work: &mut Work<T>, group: &mut Group<T>, substeps: usize) {
         self.advance(work, group, substeps);
         self.refresh(work, group);
     }
 
-    /// The same without bringing the readings up to date: they show the state from which the last physics step computed
+    /// Like [`Sim::step`], without updating the readings. They show the state from which the last physics step computed
     /// its forces, as after MuJoCo's `mj_step` (with RK4, the state of its last stage).
     ///
-    /// Within one call a step reuses what the step before it found out, so one call is faster than as many calls of one
-    /// step each. The results are the same to rounding; equal bits take equal calls.
+    /// Within one call, a step reuses results of the previous step, so one call is faster than several calls of one
+    /// step each. The results are the same up to rounding. Equal bits require equal calls.
     pub fn advance(&self, work: &mut Work<T>, group: &mut Group<T>, substeps: usize) {
         for touched in work.contacts.touched.iter_mut() {
             *touched = T::none();

@@ -86,8 +86,8 @@ impl<T: Real> Kernel<T> for RkStage<'_, T> {
     }
 }
 
-/// Angular velocities of rotated stages as rates of the rotation vector from the start (Munthe-Kaas: the inverse of the
-/// exponential's differential), which is what makes the method of fourth order for quaternions.
+/// Converts angular velocities of rotated stages to rates of the rotation vector from the start (Munthe-Kaas: the
+/// inverse of the exponential's differential). This makes the method fourth-order for quaternions.
 ///
 /// `rate` holds the stage's velocities, `before` the rates of the stage that led here in `h` seconds.
 #[inline(always)]
@@ -102,7 +102,7 @@ fn correct_rotations<T: Real>(sim: &Sim<T>, before: &[T], rate: &mut [T], h: T) 
         let w = [rate[d], rate[d + 1], rate[d + 2]];
         let once = cross(&u, &w);
         let twice = cross(&u, &once);
-        // (1 - t/2 cot(t/2)) / t^2 for the angle t, as its series
+        // (1 - t/2 cot(t/2)) / t^2 for the angle t, as a series
         let t2 = dot(&u, &u);
         let c = T::lit(1.0 / 1_209_600.0).mul_add(t2, T::lit(1.0 / 30_240.0));
         let c = c.mul_add(t2, T::lit(1.0 / 720.0)).mul_add(t2, T::lit(1.0 / 12.0));

@@ -9,7 +9,7 @@ use crate::lanes::Real;
 use crate::sim::Sim;
 use crate::state::{Capped, Work};
 
-/// Bound on the previous direction's share in the next one.
+/// Lower bound on the previous direction's share in the next one.
 const ETA: f64 = 0.01;
 
 /// Computes `inv(M)` times the gradient into `solution`, with the factors of the unconstrained acceleration.

@@ -1,4 +1,4 @@
-//! Where geoms are and what they touch.
+//! Positions of geoms, and their contacts.
 
 use crate::algebra::spatial::V3;
 use crate::geometry::field_capsule::Gaps;
@@ -8,7 +8,7 @@ use crate::sim::Sim;
 use crate::state::clearance::Clearances;
 use crate::state::sweep::Sweep;
 
-/// Where geoms are and what they touch.
+/// Positions of geoms, and their contacts.
 #[derive(Clone, Debug)]
 pub(crate) struct GeomContacts<T: Real> {
     /// Per geom: lanes that touch the static world at the last physics step, and at any step of the last `step` call.
@@ -19,12 +19,12 @@ pub(crate) struct GeomContacts<T: Real> {
     pub normal_force: Vec<T>,
     /// Per geom: lanes that touch another moving geom at the last physics step.
     pub touching_bodies: Vec<T::Mask>,
-    /// Centers of the geoms that meet others, relative to their trees' reference points; of static ones, in the world.
+    /// Centers of the geoms in pairs, relative to their trees' reference points; for static geoms, in the world.
     pub centers: Vec<V3<T>>,
-    /// Their third axes: of a plane its normal, of a capsule its direction.
+    /// Their third axes: a plane's normal, a capsule's direction.
     pub directions: Vec<V3<T>>,
     pub clearances: Clearances<T>,
-    /// Pairs that may touch, if there are so many that a broad phase chooses them.
+    /// Pairs that may touch, if the broad phase is used.
     pub sweep: Sweep<T::Scalar>,
     /// Contacts of one pair of geoms, and of one lane of them.
     pub touches: Vec<Touch<T>>,
@@ -55,7 +55,7 @@ impl<T: Real> GeomContacts<T> {
         }
     }
 
-    /// A geom touches the static world in the lanes `on`.
+    /// Marks a geom as touching the static world in the lanes `on`.
     #[inline(always)]
     pub fn touch_ground(&mut self, geom: usize, on: T::Mask) {
         self.touching[geom] = T::or(self.touching[geom], on);

@@ -11,14 +11,14 @@ pub(crate) struct Forces<T: Real> {
     pub qfrc_passive: Vec<T>,
     /// `qfrc_passive + qfrc_actuator` in one sum: each actuator adds to what is there, in the model's order.
     pub qfrc_passive_actuator: Vec<T>,
-    /// Minus the derivative of these forces by the velocities, on its diagonal (MuJoCo's `qDeriv`): what
-    /// `implicitfast` takes at the end of the step.
+    /// Negative derivative of these forces with respect to the velocities, on its diagonal (MuJoCo's `qDeriv`): the
+    /// part that `implicitfast` takes at the end of the step.
     pub minus_qderiv: Vec<T>,
     /// Rate of change of the activations.
     pub act_dot: Vec<T>,
     pub tendon_length: Vec<T>,
     pub tendon_velocity: Vec<T>,
-    /// Torque and force on every link from outside: gravity compensation, fluid, and pushes (`xfrc_applied`). Empty:
+    /// External torque and force on every link: gravity compensation, fluid, and pushes (`xfrc_applied`). Empty for
     /// none.
     pub link_applied: Vec<V6<T>>,
     /// Force of each actuator.
@@ -41,7 +41,7 @@ impl<T: Real> Forces<T> {
         }
     }
 
-    /// Whether forces from outside act on links.
+    /// Whether external forces act on links.
     #[inline(always)]
     pub fn acts_on_links(&self) -> bool {
         !self.link_applied.is_empty()

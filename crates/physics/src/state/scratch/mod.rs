@@ -22,7 +22,7 @@ use crate::lanes::Real;
 use crate::rows::ConstraintRows;
 use crate::sim::Sim;
 
-/// Scratch memory of a step; holds the readings of the group stepped last. One per thread.
+/// Scratch memory of a step, with the readings of the group stepped last. One per thread.
 #[derive(Clone, Debug)]
 pub struct Work<T: Real> {
     pub(crate) motion: Motion<T>,
@@ -32,12 +32,12 @@ pub struct Work<T: Real> {
     pub(crate) readings: Measured<T>,
     /// Rows of the last evaluation of the forces.
     pub(crate) rows: ConstraintRows<T>,
-    /// Rows of the evaluation before, if the present one [continues](Work::continues) it; else none. What pushed then
-    /// mostly pushes now. (The accelerations of then are a worse guide: a contact that was slowing something down is, by
-    /// them, about to let go.)
+    /// Rows of the previous evaluation, if the current one [continues](Work::continues) it; else none. Active rows
+    /// mostly stay active. (The previous accelerations are a worse guide: they suggest that a contact that was slowing
+    /// something down is about to open.)
     pub(crate) past: ConstraintRows<T>,
-    /// The last evaluation of the forces was of the same group, a fraction of a step ago. That holds within a call of
-    /// `Sim::advance`, and there is much that one can keep from it.
+    /// Whether the last evaluation of the forces was of the same group, a fraction of a step ago. That holds within a
+    /// call of `Sim::advance`, and allows to reuse much of it.
     pub(crate) continues: bool,
     pub(crate) rk4: Rk4<T>,
     pub(crate) stats: SolverStats,
@@ -60,7 +60,7 @@ impl<T: Real> Work<T> {
         }
     }
 
-    /// Makes room for new rows; those of before become the [past](Work::past).
+    /// Makes room for new rows. The current ones become the [past](Work::past).
     #[inline(always)]
     pub(crate) fn put_rows_aside(&mut self) {
         std::mem::swap(&mut self.rows, &mut self.past);
@@ -76,9 +76,9 @@ impl<T: Real> Work<T> {
     }
 }
 
-/// What the bias force of a link leaves to joints and constraints, after the forces that act on the link from outside:
-/// gravity compensation, fluid and pushes. `applied` says whether there are such forces
-/// ([`Forces::acts_on_links`]): asked once, not for every link.
+/// The part of a link's bias force that remains for joints and constraints after external forces on the link: gravity
+/// compensation, fluid and pushes. `applied` says whether there are such forces ([`Forces::acts_on_links`]), so that it
+/// is checked once instead of per link.
 #[inline(always)]
 pub(crate) fn net_bias_force<T: Real>(motion: &Motion<T>, forces: &Forces<T>, applied: bool, link: usize) -> V6<T> {
     let mut f = motion.bias_force[link];

@@ -1,10 +1,10 @@
-//! What positions and velocities alone determine.
+//! Quantities that depend on positions and velocities only.
 
 use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::sim::{Mount, Sim};
 
-/// What positions and velocities alone determine.
+/// Quantities that depend on positions and velocities only.
 #[derive(Clone, Debug)]
 pub(crate) struct Motion<T: Real> {
     /// Position of each tree's reference point (the origin of its root link) in the world.
@@ -21,7 +21,7 @@ pub(crate) struct Motion<T: Real> {
     pub vel: Vec<V6<T>>,
     /// Velocity-dependent acceleration of each link, gravity included.
     pub bias_acc: Vec<V6<T>>,
-    /// Force that the present motion and gravity would need: `I a + v x I v`.
+    /// Force that the current motion and gravity would need: `I a + v x I v`.
     pub bias_force: Vec<V6<T>>,
 }
 

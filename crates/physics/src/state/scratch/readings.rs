@@ -1,22 +1,22 @@
-//! What a step does not need, and is measured on request.
+//! Quantities that a step does not need, measured on request.
 
 use crate::algebra::spatial::{V3, V6};
 use crate::lanes::Real;
 use crate::sim::Sim;
 
-/// What a step does not need, and is measured on request.
+/// Quantities that a step does not need, measured on request.
 #[derive(Clone, Debug)]
 pub(crate) struct Measured<T: Real> {
-    /// Per body without a moving parent: from its center of mass to that of all that hangs from it.
+    /// Per body without a moving parent: vector from its center of mass to that of its subtree.
     pub tree_com: Vec<V3<T>>,
-    /// Per body: torque and force from outside, about the center of mass of its tree.
+    /// Per body: external torque and force, about the center of mass of its tree.
     pub cfrc_ext: Vec<V6<T>>,
     /// Per degree of freedom: forces of actuators and constraints.
     pub qfrc_actuator: Vec<T>,
     pub qfrc_constraint: Vec<T>,
-    /// Constraint forces on links, which [`qfrc_constraint`](Measured::qfrc_constraint) is made of.
+    /// Constraint forces on links, from which [`qfrc_constraint`](Measured::qfrc_constraint) is computed.
     pub link_force: Vec<V6<T>>,
-    /// What touch sensors feel on the sites that were asked for, N.
+    /// Touch sensor forces on the requested sites, N.
     pub touch_forces: Vec<T>,
 }
 

@@ -3,14 +3,14 @@
 use crate::lanes::Real;
 use crate::sim::Sim;
 
-/// Memory of the Runge-Kutta integrator; empty for models that another one integrates.
+/// Memory of the Runge-Kutta integrator. Empty for models with another integrator.
 #[derive(Clone, Debug)]
 pub(crate) struct Rk4<T: Real> {
     /// State at the beginning of the step.
     pub qpos: Vec<T>,
     pub qvel: Vec<T>,
     pub act: Vec<T>,
-    /// Velocities of the present stage in the tangent space of the beginning, and those of the stage before.
+    /// Velocities of the current stage in the tangent space of the start, and those of the previous stage.
     pub rate: Vec<T>,
     pub rate_before: Vec<T>,
     /// Weighted sums over the stages.

@@ -22,7 +22,7 @@ pub(crate) struct Solver<T: Real> {
     pub in_contact: Vec<bool>,
     /// Diagonal added to the mass matrix: armature, limit stiffness, implicit damping.
     pub diag: Vec<T>,
-    /// Joint forces of the present right-hand side.
+    /// Joint forces of the current right-hand side.
     pub rhs: Vec<T>,
     /// Articulated inertias and forces.
     pub art: Vec<Sym6<T>>,
@@ -34,7 +34,7 @@ pub(crate) struct Solver<T: Real> {
     pub drive: Vec<T>,
     /// The same before the coupled blocks' correction.
     pub tree_drive: Vec<T>,
-    /// Links whose matrix or forces changed since they were factorized.
+    /// Links whose matrix or forces changed since their last factorization.
     pub stale: Vec<bool>,
     /// Per tree with a free root: triangular factor, inverse pivots on the diagonal.
     pub root_factor: Vec<[[T; 6]; 6]>,
@@ -42,9 +42,9 @@ pub(crate) struct Solver<T: Real> {
     pub link_force: Vec<V6<T>>,
     pub coupling: Coupling<T>,
     pub capped: Capped<T>,
-    /// Per lane, once one has had a crowd: its factorization.
+    /// Per lane, once it has had a crowd: its factorization.
     pub crowds: Vec<Crowd<T::Scalar>>,
-    /// Lanes that are solved by it in the present step.
+    /// Lanes that use it in the current step.
     pub crowded: T::Mask,
 }
 
