@@ -1,4 +1,4 @@
-//! What is wrong with a clip, if anything: limits, ground, overlaps, jumps, slides.
+//! Checks of a clip: joint limits, ground, overlaps, jumps, foot sliding.
 
 use crate::clip::{Clip, Nearness};
 use crate::contact::{self, clearance};
@@ -14,18 +14,18 @@ use marathon_physics::model::JointType;
 use serde::Serialize;
 use std::path::Path;
 
-/// A clip in numbers.
+/// Measurements of a clip.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// Frames.
     pub frames: usize,
     /// Length, s.
     pub seconds: f64,
-    /// Furthest beyond a limit, rad or m.
+    /// Largest violation of a joint limit, rad or m.
     pub limit: Peak,
-    /// Deepest below the ground, m.
+    /// Largest depth below the ground, m.
     pub depth: Peak,
-    /// Deepest overlap of two bodies that collide, m.
+    /// Largest overlap of two colliding bodies, m.
     pub overlap: Peak,
     /// Highest speed of a hinge or of a free body's rotation, rad/s.
     pub speed: Peak,
@@ -33,21 +33,21 @@ pub struct Report {
     pub travel: Peak,
     /// Largest change of a hinge's speed from frame to frame, rad/s.
     pub jump: Peak,
-    /// Height of the lowest point in the frame where it is lowest, m.
+    /// Height of the lowest point over all frames, m.
     pub height: f64,
-    /// Furthest that a sole slides while it stands, m.
+    /// Largest distance that a sole slides in one ground contact, m.
     pub slide: Peak,
-    /// Mean speed along the ground of what stands, m/s.
+    /// Mean horizontal speed of the standing soles, m/s.
     pub slide_speed: f64,
-    /// Share of the frames in which a sole stands.
+    /// Fraction of the frames in which a sole stands.
     pub standing: f64,
     /// The clip's distance from its recording, as its file states it.
     pub fit: Option<Nearness>,
-    /// What the clip takes of motors and ground; none for models whose inverse dynamics is not known.
+    /// Motor and ground forces that the clip needs. `None` for models without supported inverse dynamics.
     pub efforts: Option<Efforts>,
 }
 
-/// Bounds from which a value of [`Report`] is worth a warning.
+/// Bounds above which a value of [`Report`] causes a warning.
 mod bound {
     /// rad or m.
     pub const LIMIT: f64 = 1e-3;
@@ -63,22 +63,22 @@ mod bound {
     pub const HEIGHT: f64 = 0.05;
     /// rad/s in a sixtieth of a second.
     pub const JUMP: f64 = 25.0;
-    /// m; a step's, as people notice it.
+    /// m; per step, the distance that people notice.
     pub const SLIDE: f64 = 0.03;
-    /// Share of the weight that nothing gives, and that what flies does not fall by.
+    /// Fraction of the weight without support, and of gravity that a flight does not follow.
     pub const MISSING: f64 = 0.5;
     /// Weight times m.
     pub const UNBALANCED: f64 = 0.15;
-    /// Joints that are worth a note.
+    /// Number of joints in the notes.
     pub const HARDEST: usize = 3;
     /// kg m^2/s.
     pub const GAINED: f64 = 5.0;
 }
 
-/// Measures a clip of a model. Soles are the bodies that stand, by index. The path is for messages.
+/// Measures a clip of a model. `soles` are the indices of the bodies that stand. The path is for messages.
 ///
 /// # Errors
-/// If the clip is another model's.
+/// If the clip is for another model.
 pub fn check(path: &Path, clip: &Clip, model: &Model, soles: &[usize]) -> Result<Report, MotionError> {
     clip.check_model(path, model)?;
     let count = clip.frames() + usize::from(clip.cycle().is_some());
@@ -148,7 +148,7 @@ pub fn check(path: &Path, clip: &Clip, model: &Model, soles: &[usize]) -> Result
     Ok(report)
 }
 
-/// Slides of soles, stance by stance.
+/// Sliding of soles, contact by contact.
 fn slides(
     model: &Model,
     touches: &[Touch],
@@ -175,7 +175,7 @@ fn slides(
 }
 
 impl Report {
-    /// What a person should know, one sentence each; none if the clip is sound.
+    /// Warnings for the user, one sentence each. Empty if the clip is fine.
     pub fn warnings(&self) -> Vec<String> {
         let mut out = Vec::new();
         let mut warn = |peak: &Peak, bound: f64, text: String| {
@@ -193,7 +193,7 @@ impl Report {
         let far = self.fit.and_then(|fit| fit.warning());
         warn(slide, bound::SLIDE, format!("{} has slid {:.1} cm while it stands", slide.name, 1e2 * slide.value));
         if self.height > bound::HEIGHT {
-            out.push(format!("no frame is on the ground: the lowest point is {:.1} cm above it", 1e2 * self.height));
+            out.push(format!("no frame touches the ground: the lowest point is {:.1} cm above it", 1e2 * self.height));
         }
         out.extend(
             far.map(|text| format!("{text}: it is another motion, or the recording was read in a wrong direction")),
@@ -201,8 +201,8 @@ impl Report {
         out
     }
 
-    /// What physics says to the clip, one sentence each: what the motors could not do, and where nothing pushes the figure
-    /// as it moves. Motion capture is never free of it, so a clip can be sound nevertheless.
+    /// Physical inconsistencies, one sentence each: torques beyond the motors, and forces without a source. Motion
+    /// capture always has some, so a clip can be fine nevertheless.
     pub fn notes(&self) -> Vec<String> {
         let Some(Efforts { joints, missing, unbalanced, flights }) = &self.efforts else { return Vec::new() };
         let mut out = Vec::new();
@@ -218,11 +218,11 @@ impl Report {
         }
         if missing.value > bound::MISSING {
             let share = 1e2 * missing.value;
-            out.push(format!("frame {}: {share:.0} % of the weight is pushed by nothing", missing.frame));
+            out.push(format!("frame {}: {share:.0} % of the weight has no support", missing.frame));
         }
         if unbalanced.value > bound::UNBALANCED {
             let (frame, moment) = (unbalanced.frame, unbalanced.value);
-            out.push(format!("frame {frame}: a moment of the weight times {moment:.2} m is held by nothing"));
+            out.push(format!("frame {frame}: a moment of the weight times {moment:.2} m has no support"));
         }
         for flight in flights {
             let [x, y, z] = flight.acceleration;

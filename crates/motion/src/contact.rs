@@ -1,4 +1,4 @@
-//! What touches the ground, and when.
+//! Ground contacts over time.
 
 use crate::clip::Clip;
 use crate::error::MotionError;
@@ -8,22 +8,23 @@ use glam::DVec3;
 use marathon_physics::Model;
 use std::path::Path;
 
-/// Highest point of a sole that still counts as standing, m.
+/// Maximum height of a sole's lowest point in a contact, m.
 const HEIGHT: f64 = 0.03;
-/// Fastest speed along the ground of what still counts as standing, m/s.
+/// Maximum horizontal speed of a sole's lowest point in a contact, m/s.
 const SPEED: f64 = 0.6;
-/// Shortest contact, s.
+/// Minimum duration of a contact, s.
 const SHORTEST: f64 = 0.05;
 
-/// Whether each of these bodies stands on the ground, frame by frame: a point of it is less than 3 cm above the ground and
-/// slower than 0.6 m/s along it, for 0.05 s or more. The path is for messages. The clip's phases are [`Clip::phase`]'s.
+/// Whether each of these bodies stands on the ground, frame by frame: a point of it is less than 3 cm above the ground
+/// and slower than 0.6 m/s along it, for 0.05 s or more. The path is for messages. The clip's phases are those of
+/// [`Clip::phase`].
 ///
 /// # Errors
-/// If the clip is another model's.
+/// If the clip is for another model.
 pub fn contacts(path: &Path, clip: &Clip, model: &Model, soles: &[usize]) -> Result<Vec<Vec<bool>>, MotionError> {
     clip.check_model(path, model)?;
     let touches = Touch::all(model);
-    // a loop's ends see each other
+    // in a loop, both ends are adjacent
     let beside = if clip.cycle().is_some() { clip.frames() as i64 } else { 0 };
     let frames: Vec<Vec<f64>> = (-beside..clip.frames() as i64 + beside).map(|i| clip.frame_at(i)).collect();
     let held = held(model, &touches, soles, &frames, clip.dt());
@@ -60,15 +61,15 @@ pub(crate) fn held(model: &Model, touches: &[Touch], soles: &[usize], frames: &[
     held
 }
 
-/// How the lowest point of a touch slides along the ground until the next frame, m. Rolling is no slide.
+/// Sliding of a touch's lowest point along the ground until the next frame, m. Rolling does not count.
 pub(crate) fn slide(touch: &Touch, now: &Pose, next: &Pose) -> DVec3 {
     let lowest = touch.lowest(now);
     let local = now.quat[touch.body].conjugate() * (lowest - now.pos[touch.body]);
     (next.point(touch.body, local) - lowest).with_z(0.0)
 }
 
-/// Each time that a touch stands: calls `each` with the touch's index, the first frame, and how its lowest point slides from
-/// frame to frame while it stands.
+/// Calls `each` for every ground contact of a touch, with the touch's index, the first frame, and the sliding of its
+/// lowest point from frame to frame.
 pub(crate) fn stances(
     touches: &[Touch],
     held: &[Vec<bool>],
@@ -89,12 +90,12 @@ pub(crate) fn stances(
     }
 }
 
-/// The lowest point of a pose above the ground, m; negative below it.
+/// The height of a pose's lowest point above the ground, m. Negative below it.
 pub(crate) fn clearance(touches: &[Touch], pose: &Pose) -> f64 {
     touches.iter().map(|touch| touch.lowest(pose).z).fold(f64::INFINITY, f64::min)
 }
 
-/// The clip lifted as a whole, so that nothing is below the ground.
+/// Lifts the whole clip so that nothing is below the ground.
 pub(crate) fn above_ground(path: &Path, model: &Model, touches: &[Touch], clip: &Clip) -> Result<Clip, MotionError> {
     let depth = (0..clip.frames()).map(|i| -clearance(touches, &Pose::of(model, clip.frame(i)))).fold(0.0, f64::max);
     clip.moved(path, model, DVec3::Z * depth)

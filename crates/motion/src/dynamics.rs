@@ -1,4 +1,4 @@
-//! Inverse dynamics: the generalized forces that a motion takes, as MuJoCo's `mj_inverse` has them without constraints.
+//! Inverse dynamics: the generalized forces of a motion, like MuJoCo's `mj_inverse` without constraints.
 
 use crate::kinematics::Pose;
 use crate::rotation::{exp, quat};
@@ -6,7 +6,7 @@ use glam::{DMat3, DQuat, DVec3};
 use marathon_physics::Model;
 use marathon_physics::model::{Joint, JointType};
 
-/// How the bodies of a model move: world axes, SI units.
+/// Motion of the bodies of a model: world axes, SI units.
 #[derive(Clone, Debug)]
 pub struct Motion {
     /// Center of mass of each body, m.
@@ -21,11 +21,11 @@ pub struct Motion {
     pub spin_rate: Vec<DVec3>,
     /// Inertia about the center of mass, kg m^2.
     pub inertia: Vec<DMat3>,
-    /// Orientation behind each joint.
+    /// Orientation after each joint.
     behind: Vec<DQuat>,
 }
 
-/// A rigid body: a point of it and how it moves.
+/// Motion of a rigid body at one of its points.
 #[derive(Clone, Copy, Default)]
 struct Rigid {
     at: DVec3,
@@ -37,7 +37,7 @@ struct Rigid {
 }
 
 impl Rigid {
-    /// The same body by another point.
+    /// The same motion at another point.
     fn moved(self, at: DVec3) -> Self {
         let way = at - self.at;
         Rigid {
@@ -48,13 +48,13 @@ impl Rigid {
         }
     }
 
-    /// The body beyond a joint about the point, which turns with this angular velocity and acceleration.
+    /// The body after a joint about the point, which rotates with this angular velocity and acceleration.
     fn turned(self, by: DQuat, spin: DVec3, rate: DVec3) -> Self {
         let spin_rate = self.spin_rate + rate + self.spin.cross(spin);
         Rigid { turn: self.turn * by, spin: self.spin + spin, spin_rate, ..self }
     }
 
-    /// The body beyond a joint.
+    /// The body after a joint.
     fn beyond(self, model: &Model, joint: &Joint, [qpos, qvel, qacc]: [&[f64]; 3]) -> Self {
         let (q, v) = (joint.qpos_adr, joint.dof_adr);
         let local = DVec3::from_array(joint.pos);
@@ -99,10 +99,10 @@ impl Rigid {
 }
 
 impl Motion {
-    /// The motion at these positions, velocities and accelerations in MuJoCo's layout.
+    /// Computes the motion at these positions, velocities and accelerations in MuJoCo's layout.
     ///
     /// # Panics
-    /// If one of them is shorter than the model's.
+    /// If one of them is too short for the model.
     pub fn of(model: &Model, qpos: &[f64], qvel: &[f64], qacc: &[f64]) -> Self {
         let count = model.bodies.len();
         let mut rigids = vec![Rigid { turn: DQuat::IDENTITY, ..Rigid::default() }; count];
@@ -152,7 +152,7 @@ impl Motion {
     }
 }
 
-/// What of a model inverse dynamics leaves out, if it has any such thing.
+/// A feature of the model that inverse dynamics does not support, if any.
 pub fn unsupported(model: &Model) -> Option<&'static str> {
     let springs = model.joints.iter().filter(|joint| matches!(joint.kind, JointType::Free | JointType::Ball));
     let found = [
@@ -164,11 +164,11 @@ pub fn unsupported(model: &Model) -> Option<&'static str> {
     found.iter().find(|(found, _)| *found).map(|(_, what)| *what)
 }
 
-/// The generalized forces of motors and contacts that a motion takes: `M qacc + bias - passive`, N or N m per degree of freedom,
-/// as MuJoCo's `mj_inverse` has them for a model without tendons, constraints and drag.
+/// The generalized forces of motors and contacts for a motion: `M qacc + bias - passive`, N or N m per degree of
+/// freedom. They equal those of MuJoCo's `mj_inverse` for a model without tendons, constraints and drag.
 ///
 /// # Panics
-/// If an argument is shorter than the model's.
+/// If an argument is too short for the model.
 pub fn inverse(model: &Model, qpos: &[f64], qvel: &[f64], qacc: &[f64]) -> Vec<f64> {
     let (motion, pose) = (Motion::of(model, qpos, qvel, qacc), Pose::of(model, qpos));
     let gravity = if model.opt.flags.gravity { DVec3::from_array(model.opt.gravity) } else { DVec3::ZERO };
@@ -198,7 +198,7 @@ pub fn inverse(model: &Model, qpos: &[f64], qvel: &[f64], qacc: &[f64]) -> Vec<f
     out
 }
 
-/// Torques of a free or ball joint from world axes, in which [`Pose::motions`] turns them, to the body's.
+/// Converts torques of a free or ball joint from world axes, as in [`Pose::motions`], to the body's axes.
 pub(crate) fn to_body_axes(joint: &Joint, behind: DQuat, forces: &mut [f64]) {
     let first = match joint.kind {
         JointType::Free => joint.dof_adr + 3,

@@ -1,4 +1,4 @@
-//! What a clip takes of the motors, and what not even the ground could give.
+//! The motor torques of a clip, and the forces that neither motors nor ground can supply.
 
 use crate::clip::Clip;
 use crate::contact::clearance;
@@ -13,82 +13,84 @@ use marathon_physics::model::{Actuator, JointType};
 use serde::Serialize;
 use std::path::Path;
 
-/// The ground pushes what is lower than this, m: contacts of motion capture are not more precise.
+/// Height below which the ground can push, m. Contacts of motion capture are not more precise.
 const NEAR: f64 = 0.02;
-/// Coefficient of friction; the cone has four edges.
+/// Coefficient of friction. The cone has four edges.
 const FRICTION: f64 = 1.0;
-/// Share of the weight, and of the weight times a meter, that counts as much as a whole motor where nothing drives a joint.
+/// Force (relative to the weight) and torque (relative to the weight times 1 m) on undriven degrees of freedom that
+/// cost as much as a whole motor.
 const ROOT: f64 = 0.02;
-/// Forces of contacts cost as much as this share of a motor per weight of the figure: decides where nothing else does.
+/// Cost of contact forces, in motors per weight of the character. It matters only between otherwise equal solutions.
 const SPARE: f64 = 1e-3;
-/// Sweeps over the forces of contacts.
+/// Iterations over the contact forces.
 const SWEEPS: usize = 200;
-/// Forces are means over so long, s: a contact begins and ends between two frames, and its instant is not known better.
+/// Averaging window of forces, s. Contacts start and end between frames, at unknown instants.
 const WINDOW: f64 = 0.1;
-/// Shortest flight that is worth a look, s.
+/// Minimum duration of a flight, s.
 const FLIGHT: f64 = 0.1;
-/// Height of all parts in a flight, m.
+/// Minimum height of all bodies in a flight, m.
 const CLEAR: f64 = 0.05;
 
-/// What a clip takes of one joint's motors.
+/// Load of one joint's motors in a clip.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Effort {
     /// The joint.
     pub joint: String,
-    /// Torque or force that the clip takes, N m or N, in the frame in which it is the largest share of the strength.
+    /// Torque or force that the clip needs, N m or N, in the frame with the highest load relative to the strength.
     pub needed: f64,
-    /// That of the motors in this direction.
+    /// Strength of the motors in this direction.
     pub strength: f64,
     /// The frame.
     pub frame: usize,
-    /// Share of the frames in which the motors are too weak.
+    /// Fraction of the frames in which the motors are too weak.
     pub beyond: f64,
 }
 
-/// A time in which nothing touches the ground.
+/// A period without ground contact.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Flight {
     /// First frame.
     pub from: usize,
     /// Last frame.
     pub to: usize,
-    /// Mean acceleration of the center of mass, m/s^2; that of gravity if the flight is one.
+    /// Mean acceleration of the center of mass, m/s^2. In a real flight it equals gravity.
     pub acceleration: [f64; 3],
-    /// Angular momentum about the center of mass when it begins, kg m^2/s.
+    /// Angular momentum about the center of mass at the start, kg m^2/s.
     pub momentum: [f64; 3],
-    /// How much of it is gained until the end, kg m^2/s; a figure in flight gains none.
+    /// Change of the angular momentum until the end, kg m^2/s. In a real flight it is zero.
     pub gained: [f64; 3],
 }
 
-/// What a clip takes.
+/// Loads of a clip.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Efforts {
-    /// Joints by how much of their strength the clip takes, the hardest first.
+    /// Joints by load relative to their strength, the highest first.
     pub joints: Vec<Effort>,
-    /// Force at the root that neither motors nor ground give, as a share of the weight, where it is largest.
+    /// Largest force at the root that neither motors nor ground supply, relative to the weight.
     pub missing: Peak,
-    /// Moment at the root that neither motors nor ground give, as a share of the weight times a meter, where it is largest.
+    /// Largest moment at the root that neither motors nor ground supply, relative to the weight times 1 m.
     pub unbalanced: Peak,
-    /// Flights of a tenth of a second or more.
+    /// Flights of 0.1 s or more.
     pub flights: Vec<Flight>,
 }
 
-/// The torques that a clip takes, as means over a tenth of a second: inverse dynamics of its frames, less what forces at the
-/// points near the ground can give. These forces lie in a friction cone of coefficient 1; of all that carry the figure, those
-/// that spare the motors most are taken. Accelerations are central differences of the clip's velocities. The path is for messages.
+/// Computes the torques of a clip, as means over 0.1 s: inverse dynamics of its frames, minus the possible forces at
+/// points near the ground. These forces lie in a friction cone of coefficient 1. Of all forces that support the
+/// character, those with the lowest motor load are chosen. Accelerations are central differences of the clip's
+/// velocities. The path is for messages.
 ///
 /// # Errors
-/// If the clip is another model's, or the model has tendons, equality constraints, drag, or springs in ball joints.
+/// If the clip is for another model, or the model has tendons, equality constraints, drag, or springs in ball joints.
 pub fn efforts(path: &Path, clip: &Clip, model: &Model) -> Result<Efforts, MotionError> {
     clip.check_model(path, model)?;
     if let Some(what) = dynamics::unsupported(model) {
-        return Err(MotionError::model(path, &model.name, format!("inverse dynamics does not know {what}")));
+        return Err(MotionError::model(path, &model.name, format!("inverse dynamics does not support {what}")));
     }
     let touches = Touch::all(model);
     let strengths = strengths(model);
     let weight = model.bodies.iter().map(|body| body.mass).sum::<f64>() * 9.81;
     let root = model.joints.first().map_or(0, |joint| joint.body);
-    // degrees of freedom that nothing drives: those that move the root, and those that turn it
+    // undriven degrees of freedom: those that move the root, and those that rotate it
     let of_root = |i: usize| model.dofs[i].body == root;
     let linear = |i: usize| {
         let joint = &model.joints[model.dofs[i].joint];
@@ -139,13 +141,13 @@ pub fn efforts(path: &Path, clip: &Clip, model: &Model) -> Result<Efforts, Motio
     Ok(Efforts { joints, missing, unbalanced, flights: flights(&states, clip.dt()) })
 }
 
-/// Flights in frames that tell whether all is high above the ground, and the momentum.
+/// Flights in frames with the height condition and the momentum.
 fn flights(states: &[(bool, (DVec3, DVec3, DVec3))], dt: f64) -> Vec<Flight> {
     let mut flights = Vec::new();
     let mut begin = 0;
     while begin < states.len() {
         let end = (begin..states.len()).find(|i| !states[*i].0).unwrap_or(states.len());
-        // velocities of the ends know the frames beside them, which touch the ground
+        // velocities at the ends depend on neighboring frames with ground contact
         if end >= begin + 4 && (end - begin - 3) as f64 * dt >= FLIGHT {
             let (from, to) = (begin + 1, end - 2);
             let ((_, v0, l0), (_, v1, l1)) = (states[from].1, states[to].1);
@@ -157,7 +159,7 @@ fn flights(states: &[(bool, (DVec3, DVec3, DVec3))], dt: f64) -> Vec<Flight> {
     flights
 }
 
-/// Per degree of freedom: the least and the largest force of its motors, if it has some.
+/// Per degree of freedom: the lowest and the highest force of its motors, if it has motors.
 fn strengths(model: &Model) -> Vec<Option<[f64; 2]>> {
     let mut strengths = vec![None; model.nv];
     for actuator in &model.actuators {
@@ -173,7 +175,7 @@ fn strengths(model: &Model) -> Vec<Option<[f64; 2]>> {
     strengths
 }
 
-/// Forces of which an actuator is capable; without bounds if nothing bounds it.
+/// Force range of an actuator, infinite without bounds.
 fn range(actuator: &Actuator) -> [f64; 2] {
     let motor = actuator.bias == [0.0; 3] && actuator.gain[1..] == [0.0; 2] && actuator.ctrl_limited;
     match (actuator.force_limited, motor) {
@@ -186,7 +188,7 @@ fn range(actuator: &Actuator) -> [f64; 2] {
     }
 }
 
-/// Takes from generalized forces what the ground gives: nonnegative least squares, by coordinate descent.
+/// Subtracts possible ground forces from generalized forces: nonnegative least squares, by coordinate descent.
 fn carry(model: &Model, pose: &Pose, near: &[&Touch], strengths: &[Option<[f64; 2]>], weight: f64, forces: &mut [f64]) {
     let scale: Vec<f64> = strengths
         .iter()
@@ -198,7 +200,7 @@ fn carry(model: &Model, pose: &Pose, near: &[&Touch], strengths: &[Option<[f64; 
     let mut edges: Vec<(Vec<f64>, f64)> = Vec::new();
     for touch in near {
         for side in [DVec3::X, DVec3::Y, DVec3::NEG_X, DVec3::NEG_Y] {
-            // in weights of the figure
+            // in weights of the character
             let push = weight * (DVec3::Z + FRICTION * side);
             let mut column = vec![0.0; model.nv];
             pose.motions(model, touch.body, touch.lowest(pose), |dof, _, shift| column[dof] += shift.dot(push));

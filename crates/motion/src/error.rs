@@ -1,8 +1,8 @@
-//! What can be wrong with a motion, a mapping, or the model that they are for.
+//! Errors of motions, mappings, and their models.
 
 use std::path::{Path, PathBuf};
 
-/// Why a motion cannot be read or used. Every message names the file.
+/// Reason why a motion cannot be read or used. Every message names the file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MotionError {
     /// The text does not follow its format.
@@ -14,10 +14,10 @@ pub enum MotionError {
         line: usize,
         /// Column, counted from 1.
         column: usize,
-        /// What was found, and what was expected.
+        /// The found and the expected text.
         problem: String,
     },
-    /// An entry of the file has a value that makes no sense.
+    /// An entry of the file has an invalid value.
     #[error("{}: {key}: found {found}, expected {expected}", path.display())]
     Value {
         /// The file.
@@ -26,27 +26,27 @@ pub enum MotionError {
         key: String,
         /// Its value.
         found: String,
-        /// What would do.
+        /// Valid values.
         expected: String,
     },
-    /// A frame is wrong.
+    /// A frame is invalid.
     #[error("{}: frame {frame}: {problem}", path.display())]
     Frame {
         /// The file.
         path: PathBuf,
         /// The frame, counted from 0.
         frame: usize,
-        /// What was found, and what was expected.
+        /// The found and the expected contents.
         problem: String,
     },
-    /// The motion and the model do not belong together.
+    /// The motion does not fit the model.
     #[error("{}: not a motion of the model {model}: {problem}", path.display())]
     Model {
         /// The file.
         path: PathBuf,
         /// Name of the model.
         model: String,
-        /// What differs.
+        /// The difference.
         problem: String,
     },
     /// The file exceeds a limit.
@@ -62,9 +62,9 @@ pub enum MotionError {
     Unsupported {
         /// The file.
         path: PathBuf,
-        /// What it is.
+        /// The feature.
         feature: String,
-        /// What makes the file usable.
+        /// How to make the file usable.
         instead: String,
     },
 }
@@ -82,7 +82,7 @@ impl MotionError {
         Self::Model { path: path.into(), model: model.into(), problem: problem.to_string() }
     }
 
-    /// A message of `serde_json`, which ends with the place that has fields of its own here.
+    /// Converts an error of `serde_json`, whose text ends with the position. The position has its own fields here.
     pub(crate) fn json(path: &Path, error: &serde_json::Error) -> Self {
         let text = error.to_string();
         let problem = text.split(" at line ").next().unwrap_or(&text).to_string();

@@ -1,11 +1,11 @@
-//! Which points of a model can touch flat ground at `z = 0`.
+//! Points of a model that can touch flat ground at `z = 0`.
 
 use crate::kinematics::Pose;
 use crate::rotation::quat;
 use glam::{DMat3, DQuat, DVec3};
 use marathon_physics::model::{GeomType, Model};
 
-/// A part of a geom that can touch the ground with one point: a ball, a corner, the rim of a disc.
+/// A part of a geom that can touch the ground in one point: a ball, a corner, the rim of a disc.
 #[derive(Clone, Debug)]
 pub(crate) struct Touch {
     pub body: usize,
@@ -24,7 +24,7 @@ enum Shape {
 }
 
 impl Touch {
-    /// All of a model's moving geoms that collide.
+    /// All colliding moving geoms of a model.
     pub fn all(model: &Model) -> Vec<Touch> {
         let mut touches = Vec::new();
         for geom in &model.geoms {

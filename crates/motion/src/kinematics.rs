@@ -1,4 +1,4 @@
-//! Forward kinematics: where the bodies of a model are, from `qpos` alone, as MuJoCo's `mj_kinematics` has it.
+//! Forward kinematics: poses of the bodies of a model from `qpos` alone, like MuJoCo's `mj_kinematics`.
 
 use crate::rotation::quat;
 use glam::{DQuat, DVec3};
@@ -51,7 +51,7 @@ impl Pose {
                         at = anchor - turn * local;
                     }
                     JointType::Hinge => {
-                        // the platform's sin and cos differ between systems, libm's do not
+                        // the platforms' sin and cos differ, libm's do not
                         let half = 0.5 * (q[0] - model.qpos0[joint.qpos_adr]);
                         let sin = libm::sin(half) * axis;
                         turn *= DQuat::from_xyzw(sin.x, sin.y, sin.z, libm::cos(half));
@@ -65,14 +65,14 @@ impl Pose {
         pose
     }
 
-    /// Where a point of a body is.
+    /// World position of a point of a body.
     pub fn point(&self, body: usize, local: DVec3) -> DVec3 {
         self.pos[body] + self.quat[body] * local
     }
 
-    /// How a body moves with each degree of freedom that moves it: calls `each` with the index of the degree of freedom, the
-    /// body's angular velocity, and the velocity of the given world point of the body. A free joint and a ball joint are
-    /// taken to turn about the world's axes.
+    /// Motion of a body with each of its degrees of freedom. Calls `each` with the index of the degree of freedom, the
+    /// body's angular velocity, and the velocity of the given world point of the body. Free and ball joints rotate
+    /// about the world's axes here.
     pub fn motions(&self, model: &Model, body: usize, point: DVec3, mut each: impl FnMut(usize, DVec3, DVec3)) {
         let mut at = body;
         while at != 0 {
@@ -102,7 +102,7 @@ impl Pose {
     }
 }
 
-/// Normalizes; a zero quaternion is the identity, as in MuJoCo's `mju_normalize4`.
+/// Normalizes a quaternion. A zero quaternion becomes the identity, as in MuJoCo's `mju_normalize4`.
 fn unit(q: DQuat) -> DQuat {
     let norm = q.length();
     if norm < 1e-15 { DQuat::IDENTITY } else { q / norm }

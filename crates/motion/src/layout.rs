@@ -1,4 +1,4 @@
-//! Which entry of `qpos` belongs to which joint.
+//! Assignment of `qpos` entries to joints.
 
 use crate::error::MotionError;
 use marathon_physics::hint::{did_you_mean, nearest};
@@ -21,7 +21,7 @@ pub enum JointKind {
 }
 
 impl JointKind {
-    /// How many numbers of `qpos`.
+    /// Number of `qpos` entries.
     pub fn nq(self) -> usize {
         match self {
             JointKind::Free => 7,
@@ -30,7 +30,7 @@ impl JointKind {
         }
     }
 
-    /// How many numbers of `qvel`.
+    /// Number of `qvel` entries.
     pub fn nv(self) -> usize {
         match self {
             JointKind::Free => 6,
@@ -51,7 +51,7 @@ impl From<JointType> for JointKind {
     }
 }
 
-/// One joint: its name, its kind, and where its numbers are.
+/// A joint: its name, its kind, and the places of its numbers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Entry {
     pub name: String,
@@ -69,7 +69,7 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// The layout of these joints.
+    /// Creates the layout of these joints.
     pub fn new(joints: impl IntoIterator<Item = (String, JointKind)>) -> Self {
         let mut layout = Layout { joints: Vec::new(), nq: 0, nv: 0 };
         for (name, kind) in joints {
@@ -100,10 +100,10 @@ impl Layout {
         self.joints.iter().map(|joint| (joint.name.as_str(), joint.kind))
     }
 
-    /// Whether a model has these joints in this order.
+    /// Checks that a model has these joints in this order.
     ///
     /// # Errors
-    /// If it has not; the message names the first joint that differs.
+    /// If it does not. The message names the first joint that differs.
     pub fn check(&self, path: &Path, model: &Model) -> Result<(), MotionError> {
         let theirs = Layout::of(model);
         let names = || theirs.joints.iter().map(|joint| joint.name.as_str());

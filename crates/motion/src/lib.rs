@@ -1,6 +1,7 @@
-//! Motion clips: from motion capture to the joint angles of a character, and their sampling.
+//! Motion clips: conversion of motion capture to joint angles of a character, and sampling.
 //!
-//! Nothing here reads a file, asks a clock or starts a thread: bytes go in, clips come out, also in a browser.
+//! This crate reads no files, uses no clock and starts no threads. Bytes go in and clips come out, so it also runs in a
+//! browser.
 //!
 //! A [`Clip`] is a motion of one MJCF model, in MuJoCo's `qpos`. Its file format is that of [`Clip::parse`] and
 //! [`Clip::to_bytes`].

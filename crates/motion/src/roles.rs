@@ -1,13 +1,13 @@
-//! Joints by what they are, under the names that skeletons of many makers give them.
+//! Joint roles, and the names that common skeletons use for them.
 
 use crate::skeleton::Skeleton;
 
-/// A role without its side, and the names of joints that play it, most fitting first. Names are compared in lower case,
-/// without a prefix such as `mixamorig:`, without their side and without punctuation.
+/// A role without its side, and the joint names that match it, best first. Names are compared in lower case, without
+/// prefixes such as `mixamorig:`, side and punctuation.
 ///
-/// Sources of the names: DeepMimic; Mixamo and Autodesk's HumanIK, whose names CMU's motions in BVH and LAFAN1 have; CMU's
-/// ASF; Unity's and VRM's humanoid; Unreal's mannequin; Blender's Rigify and its deforming bones; 3ds Max's Biped; Poser and
-/// Daz; Bandai Namco's motions; the bodies of Marathon's own models.
+/// Sources of the names: DeepMimic; Mixamo and Autodesk's HumanIK (also used by CMU's motions in BVH and LAFAN1); CMU's
+/// ASF; Unity's and VRM's humanoid; Unreal's mannequin; Blender's Rigify and its deforming bones; 3ds Max's Biped;
+/// Poser and Daz; Bandai Namco's motions; the bodies of Marathon's models.
 const ROLES: [(&str, &[&str]); 11] = [
     ("root", &["root", "hips", "hip", "pelvis", "butt", "spine"]),
     (
@@ -43,15 +43,15 @@ const ROLES: [(&str, &[&str]); 11] = [
 /// Prefixes of all names in a skeleton: 3ds Max's Biped, Rigify's deforming bones and VRoid.
 const PREFIXES: [&str; 7] = ["bip001", "bip01", "def-", "def_", "org-", "j_bip_c_", "j_bip_"];
 
-/// Left or right of a figure.
+/// Side of a character.
 #[derive(Clone, Copy, PartialEq)]
 enum Side {
     Left,
     Right,
 }
 
-/// The joint of a name or, if no joint has it, of a role: `root`, `chest`, `neck`, `head`, or `left_` or `right_` and `hip`,
-/// `knee`, `ankle`, `toe`, `shoulder`, `elbow`, `wrist`.
+/// The joint with this name or, if there is none, with this role: `root`, `chest`, `neck`, `head`, or `left_` or
+/// `right_` and `hip`, `knee`, `ankle`, `toe`, `shoulder`, `elbow`, `wrist`.
 pub(crate) fn find(skeleton: &Skeleton, wanted: &str) -> Option<usize> {
     if wanted == "root" {
         return pelvis(skeleton);
@@ -164,7 +164,7 @@ fn split(name: &str) -> (Option<Side>, String) {
             }
         }
     }
-    // Biped's Bip01 L Thigh, whose prefix may be another
+    // Biped's Bip01 L Thigh, whose prefix may vary
     for (letter, side) in [(" l ", Side::Left), (" r ", Side::Right)] {
         if let Some((_, stem)) = lower.split_once(letter) {
             return (Some(side), plain(stem));

@@ -3,12 +3,12 @@
 
 use glam::{DQuat, DVec3};
 
-/// From MuJoCo's order `[w, x, y, z]`.
+/// Converts from MuJoCo's order `[w, x, y, z]`.
 pub(crate) fn quat(q: &[f64]) -> DQuat {
     DQuat::from_xyzw(q[1], q[2], q[3], q[0])
 }
 
-/// Into MuJoCo's order `[w, x, y, z]`.
+/// Converts to MuJoCo's order `[w, x, y, z]`.
 pub(crate) fn wxyz(q: DQuat) -> [f64; 4] {
     [q.w, q.x, q.y, q.z]
 }
@@ -16,13 +16,13 @@ pub(crate) fn wxyz(q: DQuat) -> [f64; 4] {
 /// The rotation by `|v|` rad about `v`.
 pub(crate) fn exp(v: DVec3) -> DQuat {
     let half = 0.5 * v.length();
-    // sin(x)/x to the last bit where the quotient is 0/0
+    // exact limit of sin(x)/x where the quotient would be 0/0
     let scale = if half < 1e-8 { 0.5 } else { 0.5 * libm::sin(half) / half };
     let axis = scale * v;
     DQuat::from_xyzw(axis.x, axis.y, axis.z, libm::cos(half))
 }
 
-/// The rotation vector of the shorter way, at most pi long.
+/// The rotation vector of the shorter rotation, with a length of at most pi.
 pub(crate) fn log(q: DQuat) -> DVec3 {
     let q = if q.w < 0.0 { -q } else { q };
     let sin = DVec3::new(q.x, q.y, q.z);
@@ -30,12 +30,13 @@ pub(crate) fn log(q: DQuat) -> DVec3 {
     if norm < 1e-12 { 2.0 * sin } else { 2.0 * libm::atan2(norm, q.w) / norm * sin }
 }
 
-/// Along the shorter great arc: `a` at 0, `b` at 1.
+/// Interpolation along the shorter great arc: `a` at 0, `b` at 1.
 pub(crate) fn slerp(a: DQuat, b: DQuat, s: f64) -> DQuat {
     (a * exp(s * log(a.conjugate() * b))).normalize()
 }
 
-/// The cubic through `a` and `b`, `seconds` apart, with these angular velocities in body axes, at the share `s` of the way.
+/// Cubic interpolation between `a` and `b`, `seconds` apart, with these angular velocities in body axes, at the
+/// fraction `s`.
 pub(crate) fn cubic(a: DQuat, b: DQuat, velocities: [DVec3; 2], seconds: f64, s: f64) -> DQuat {
     let way = log(a.conjugate() * b);
     let [start, end] = velocities.map(|v| v * seconds);
@@ -45,24 +46,24 @@ pub(crate) fn cubic(a: DQuat, b: DQuat, velocities: [DVec3; 2], seconds: f64, s:
     (a * exp(first * way + second * start + third * end)).normalize()
 }
 
-/// Weights of Hermite's cubic at the share `s` of the way: of the start, the end, and the two slopes.
+/// Weights of Hermite's cubic at the fraction `s`: of the start, the end, and the two slopes.
 pub(crate) fn hermite(s: f64) -> [f64; 4] {
     let rest = 1.0 - s;
     [(1.0 + 2.0 * s) * rest * rest, s * s * (3.0 - 2.0 * s), s * rest * rest, -s * s * rest]
 }
 
-/// The rotation by `angle` rad about the vertical.
+/// The rotation by `angle` rad about the vertical axis.
 pub(crate) fn about_z(angle: f64) -> DQuat {
     DQuat::from_xyzw(0.0, 0.0, libm::sin(0.5 * angle), libm::cos(0.5 * angle))
 }
 
-/// Heading, rad: the twist of a rotation about the vertical. Unlike the direction of one axis it changes smoothly through
-/// a somersault.
+/// Heading, rad: the twist of a rotation about the vertical axis. Unlike the direction of one axis, it changes smoothly
+/// through a somersault.
 pub(crate) fn heading(q: DQuat) -> f64 {
     wrap_angle(2.0 * libm::atan2(q.z, q.w))
 }
 
-/// The same angle within -pi to pi.
+/// The equivalent angle within -pi to pi.
 pub(crate) fn wrap_angle(angle: f64) -> f64 {
     let turns = libm::round(angle / std::f64::consts::TAU);
     angle - turns * std::f64::consts::TAU

@@ -1,5 +1,5 @@
-//! Self-collision: pairs of geoms of a model that must not overlap, and their separation. Spheres and capsules only, of which
-//! ragdolls are made.
+//! Self-collision: pairs of geoms of a model that must not overlap, and their separation. Supports only spheres and
+//! capsules, which ragdolls consist of.
 
 use crate::kinematics::Pose;
 use crate::rotation::quat;
@@ -22,7 +22,7 @@ pub(crate) struct CapsulePair {
     b: Capsule,
 }
 
-/// How far two geoms are from each other.
+/// Separation of two geoms.
 pub(crate) struct Separation {
     /// Distance between the surfaces, m; negative where they overlap.
     pub distance: f64,
@@ -30,12 +30,12 @@ pub(crate) struct Separation {
     pub bodies: [usize; 2],
     /// The nearest points of the geoms' lines.
     pub points: [DVec3; 2],
-    /// From the second to the first.
+    /// Direction from the second to the first.
     pub normal: DVec3,
 }
 
 impl CapsulePair {
-    /// All pairs of moving geoms that collide by MuJoCo's rules, but for those that overlap in the reference pose.
+    /// All pairs of moving geoms that collide by MuJoCo's rules, except those that overlap in the reference pose.
     pub fn all(model: &Model) -> Vec<CapsulePair> {
         let capsules: Vec<(usize, Capsule)> =
             (0..model.geoms.len()).filter_map(|i| Some((i, capsule(model, i)?))).collect();
@@ -67,7 +67,7 @@ impl CapsulePair {
         let points = nearest(line(&self.a), line(&self.b));
         let apart = points[0] - points[1];
         let distance = apart.length();
-        // lines that cross have no direction; any will part them
+        // crossing lines have no direction; any direction separates them
         let normal = if distance > 1e-9 { apart / distance } else { DVec3::Z };
         Separation {
             distance: distance - self.a.radius - self.b.radius,

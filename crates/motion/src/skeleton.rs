@@ -1,4 +1,4 @@
-//! Recorded motions before they are a model's: a skeleton of joints, and how it moves.
+//! Recorded motions before retargeting: a skeleton of joints, and its motion.
 
 use crate::clip::{About, Clip, Cycle};
 use crate::error::MotionError;
@@ -15,22 +15,22 @@ use std::path::Path;
 pub struct Bone {
     /// Name.
     pub name: String,
-    /// Index of the joint that it hangs from; it is lower than its own. None for the root.
+    /// Index of its parent, which is lower than its own. `None` for the root.
     pub parent: Option<usize>,
-    /// Where it is in the frame of its parent, m.
+    /// Position in the frame of its parent, m.
     pub offset: [f64; 3],
-    /// Its rotation in the frame of its parent while the skeleton rests, `[w, x, y, z]`.
+    /// Rotation in the frame of its parent in the rest pose, `[w, x, y, z]`.
     pub rest: [f64; 4],
 }
 
 /// Joints from the root to the tips. Lengths are in meters, z points up, axes are right-handed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Skeleton {
-    /// The joints; parents come before their children, and the first is the root.
+    /// The joints. Parents come before their children, and the first joint is the root.
     pub bones: Vec<Bone>,
 }
 
-/// Where the joints of a skeleton are in the world.
+/// World poses of the joints of a skeleton.
 #[derive(Clone, Debug)]
 pub(crate) struct SkeletonPose {
     pub pos: Vec<DVec3>,
@@ -79,7 +79,7 @@ impl Seam {
 }
 
 impl Keyframe {
-    /// An instant at this share of the way to another.
+    /// Interpolates between two keyframes.
     pub(crate) fn blended(&self, to: &Keyframe, share: f64) -> Keyframe {
         let root = [0, 1, 2].map(|i| self.root[i] + share * (to.root[i] - self.root[i]));
         let rotations = self.rotations.iter().zip(&to.rotations);
@@ -99,7 +99,7 @@ impl Skeleton {
         true
     }
 
-    /// The skeleton at rest, its root at the origin.
+    /// The skeleton in its rest pose, with its root at the origin.
     pub(crate) fn rest(&self) -> SkeletonPose {
         let rotations: Vec<DQuat> = self.bones.iter().map(|bone| quat(&bone.rest)).collect();
         self.pose(DVec3::ZERO, &rotations)
@@ -123,8 +123,8 @@ impl Skeleton {
 }
 
 impl Animation {
-    /// An animation of these keyframes, `dt` seconds apart. It wraps if its last pose is meant to be its first again, farther
-    /// on. The path is for messages.
+    /// Creates an animation of these keyframes, `dt` seconds apart. `wraps`: its last pose is meant to repeat the first
+    /// one, farther on. The path is for messages.
     ///
     /// # Errors
     /// As [`Clip::new`].
@@ -146,11 +146,11 @@ impl Animation {
         Ok(Animation { skeleton, clip, wraps })
     }
 
-    /// The motion of a model's bodies: a joint for each, named as the body, at the anchor of the body's first joint. The path
-    /// is for messages.
+    /// The motion of a model's bodies: a joint per body with the body's name, at the anchor of the body's first joint.
+    /// The path is for messages.
     ///
     /// # Errors
-    /// If the clip is not one of the model's, or the model has no moving body.
+    /// If the clip is for another model, or the model has no moving body.
     pub fn of_clip(path: &Path, model: &Model, clip: &Clip) -> Result<Self, MotionError> {
         clip.check_model(path, model)?;
         let Some(first) = model.joints.first().map(|joint| joint.body) else {
@@ -210,13 +210,13 @@ impl Animation {
         &self.clip
     }
 
-    /// Whether its last pose is meant to be its first again, farther on.
+    /// Whether its last pose is meant to repeat the first one, farther on.
     pub fn wraps(&self) -> bool {
         self.wraps
     }
 
-    /// The motion as an endless one. Recordings never close exactly; what is left is spread over the whole cycle, where it
-    /// shows least. The path is for messages.
+    /// The motion as a loop. Recordings never close exactly; the remainder is spread over the whole cycle, where it is
+    /// least visible. The path is for messages.
     ///
     /// # Errors
     /// As [`Clip::looped`].
@@ -242,17 +242,17 @@ impl Animation {
         }
     }
 
-    /// The same skeleton with its motion changed, by the edits of a [`Clip`].
+    /// The same skeleton with another motion, for edits of its [`Clip`].
     pub fn with_clip(&self, clip: Clip) -> Self {
         Animation { skeleton: self.skeleton.clone(), clip, wraps: self.wraps }
     }
 
-    /// How far a cycle gets, if the motion loops.
+    /// Displacement per cycle, if the motion loops.
     pub fn cycle(&self) -> Option<Cycle> {
         self.clip.cycle()
     }
 
-    /// Where the joints are in a frame, which may be one of another cycle.
+    /// World poses of the joints in a frame, which may belong to another cycle.
     pub(crate) fn pose(&self, frame: i64) -> SkeletonPose {
         let qpos = self.clip.frame_at(frame);
         let rotations: Vec<DQuat> = (0..self.skeleton.bones.len()).map(|i| quat(&qpos[3 + 4 * i..])).collect();

@@ -1,4 +1,4 @@
-//! How a motion that was played compares with the clip it follows, as the field measures it.
+//! Measures of how well a simulated motion follows its clip, as used in the literature.
 
 use crate::contact;
 use crate::ground::Touch;
@@ -7,28 +7,28 @@ use crate::retarget::soles;
 use glam::DVec3;
 use marathon_physics::Model;
 
-/// Height of the vertical component of the pelvis' up axis that a flip passes on both sides: 60 degrees from upright and
-/// from upside down.
+/// Height of the pelvis's up axis that a flip crosses on both sides: 60 degrees from upright and from upside down.
 const UPRIGHT: f64 = 0.5;
 
 /// Measures motions of a model.
 #[derive(Clone, Debug)]
 pub struct Tracking<'a> {
     model: &'a Model,
-    /// Body that the legs begin at.
+    /// Body at the top of the legs.
     pelvis: usize,
-    /// Bodies, and points on them, whose places are compared.
+    /// Compared points: bodies, and positions on them.
     points: Vec<(usize, DVec3)>,
     soles: Vec<usize>,
     touches: Vec<Touch>,
 }
 
-/// Places of a pose's points as seen from the pelvis, world axes, m.
+/// Positions of a pose's points relative to the pelvis, world axes, m.
 pub type Places = Vec<DVec3>;
 
 impl<'a> Tracking<'a> {
-    /// For a model. Compared are the joints of the AMP paper as far as the model has them: the origins of all moving bodies,
-    /// where their joints are, and the ends of arms and legs, which are the farthest geoms of bodies without children.
+    /// Prepares the measures for a model. They compare the joints of the AMP paper as far as the model has them: the
+    /// origins of all moving bodies, which are at their joints, and the ends of arms and legs, which are the farthest
+    /// geoms of bodies without children.
     pub fn new(model: &'a Model) -> Self {
         let soles = soles(model);
         let pelvis = pelvis(model, &soles);
@@ -49,15 +49,16 @@ impl<'a> Tracking<'a> {
         Tracking { model, pelvis, points, soles, touches: Touch::all(model) }
     }
 
-    /// Where the compared points of a pose are.
+    /// Positions of the compared points of a pose.
     pub fn places(&self, qpos: &[f64]) -> Places {
         let pose = Pose::of(self.model, qpos);
         let from = pose.pos[self.pelvis];
         self.points.iter().map(|(body, local)| pose.point(*body, *local) - from).collect()
     }
 
-    /// Mean distance of the compared points, as seen from the pelvis, after both motions were aligned in time by dynamic
-    /// time warping (Sakoe and Chiba, 1978): table 3 of the AMP paper (Peng et al., 2021), m. None without poses.
+    /// Mean distance of the compared points, relative to the pelvis, after both motions are aligned in time by dynamic
+    /// time warping (Sakoe and Chiba, 1978), m. This is the measure of table 3 of the AMP paper (Peng et al., 2021).
+    /// `None` without poses.
     pub fn pose_error(&self, played: &[Places], clip: &[Places]) -> Option<f64> {
         let cost = |i: usize, j: usize| {
             let pairs = played[i].iter().zip(&clip[j]);
@@ -66,7 +67,7 @@ impl<'a> Tracking<'a> {
         if played.is_empty() || clip.is_empty() || self.points.is_empty() {
             return None;
         }
-        // of the cheapest way to each pair of a row: its cost and its length
+        // for each pair of a row: cost and length of the cheapest path to it
         let mut before: Vec<(f64, usize)> = Vec::new();
         for i in 0..played.len() {
             let mut row: Vec<(f64, usize)> = Vec::with_capacity(clip.len());
@@ -83,7 +84,7 @@ impl<'a> Tracking<'a> {
         before.last().map(|(sum, length)| sum / *length as f64)
     }
 
-    /// How often the pelvis has been upside down and upright again.
+    /// Number of times that the pelvis has been upside down and upright again.
     pub fn flips(&self, frames: &[Vec<f64>]) -> usize {
         let (mut flips, mut upside_down) = (0, false);
         for frame in frames {
@@ -98,8 +99,8 @@ impl<'a> Tracking<'a> {
         flips
     }
 
-    /// How far soles slide while they stand, m, one number for each time that a part of a sole stands on level ground: the
-    /// way of its lowest point from beginning to end. `dt`: seconds from frame to frame.
+    /// Foot sliding on level ground, m: for each ground contact of a part of a sole, the distance that its lowest point
+    /// moves from start to end. `dt`: seconds between frames.
     pub fn slides(&self, frames: &[Vec<f64>], dt: f64) -> Vec<f64> {
         if frames.is_empty() {
             return Vec::new();
@@ -114,7 +115,7 @@ impl<'a> Tracking<'a> {
     }
 }
 
-/// The body that the legs begin at: the last one from which all soles descend; the first one without soles.
+/// The body at the top of the legs: the last one above all soles, or the first body without soles.
 fn pelvis(model: &Model, soles: &[usize]) -> usize {
     let chain = |mut body: usize| {
         let mut chain = Vec::new();

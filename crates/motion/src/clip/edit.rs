@@ -1,4 +1,4 @@
-//! Changes of a clip: trim, loop, resample, smooth, mirror, move.
+//! Edits of a clip: trim, loop, resample, smooth, mirror, move.
 
 use super::{Clip, Cycle, quaternions};
 use crate::error::MotionError;
@@ -12,7 +12,7 @@ use marathon_physics::model::JointType;
 use std::path::Path;
 
 impl Clip {
-    /// The part from one time to another, s, to the nearest frames. It does not loop.
+    /// Cuts out the part from one time to another, s, to the nearest frames. It does not loop.
     ///
     /// # Errors
     /// If fewer than two frames would remain.
@@ -28,16 +28,16 @@ impl Clip {
         self.rebuilt(path, self.dt, None, &rows)
     }
 
-    /// A cycle from a clip whose last frame is its first again, farther on. What differs between the two beside the
-    /// travel is spread over the clip's last `blend` seconds. So is a turn of less than 0.4 rad: people who record a walk
-    /// straight ahead do not end exactly as they began.
+    /// Creates a loop from a clip whose last frame repeats the first one, farther on. The difference between both
+    /// frames, other than the travel, is spread over the clip's last `blend` seconds. A turn of less than 0.4 rad is
+    /// also spread, because recordings of straight walks do not end exactly in the starting direction.
     ///
     /// # Errors
-    /// If there are fewer than three frames, of which the last repeats the first, or the travel exceeds the limits of a
+    /// If there are fewer than three frames, the last of which repeats the first, or the travel exceeds the limits of a
     /// clip.
     pub fn looped(&self, path: &Path, blend: f64) -> Result<Self, MotionError> {
         if self.frames() < 3 {
-            let expected = "three or more, of which the last is the first again";
+            let expected = "three or more, of which the last repeats the first";
             return Err(MotionError::value(path, "frames of a loop", self.frames(), expected));
         }
         let mut cycle = Cycle::between(&self.layout, self.frame(0), self.frame(self.frames() - 1));
@@ -48,7 +48,7 @@ impl Clip {
         self.joined(path, cycle, blend)
     }
 
-    /// A cycle from a clip whose last frame is its first again after this cycle, but for rounding errors.
+    /// Creates a loop from a clip whose last frame repeats the first one after this cycle, up to rounding errors.
     pub(crate) fn closed(&self, path: &Path, cycle: Cycle) -> Result<Self, MotionError> {
         self.joined(path, cycle, self.duration())
     }
@@ -62,7 +62,7 @@ impl Clip {
         let window = (blend / self.dt).clamp(1.0, count as f64);
         for (i, row) in rows.iter_mut().enumerate() {
             let s = (1.0 - (count - i) as f64 / window).clamp(0.0, 1.0);
-            // over a whole cycle a steady drift shows least; over a part of it, one that begins and ends gently
+            // over a whole cycle a steady correction is least visible; over a part of it, a smooth one
             let share = if blend < self.duration() { s * s * (3.0 - 2.0 * s) } else { s };
             for k in 0..row.len() {
                 row[k] += share * (target[k] - end[k]);
@@ -77,11 +77,11 @@ impl Clip {
         self.rebuilt(path, self.dt, Some(cycle), &rows)
     }
 
-    /// The same motion with another step between frames, by cubic interpolation. A looping clip keeps its length, so that
-    /// its step is the nearest that divides it.
+    /// Resamples the motion with another step between frames, by cubic interpolation. A looping clip keeps its length,
+    /// so its step is the nearest one that divides the length.
     ///
     /// # Errors
-    /// If the step is not a number from 0.0001 to half of the clip, or the result would exceed the memory limit.
+    /// If the step is not between 0.0001 s and half of the clip, or the result would exceed the memory limit.
     pub fn resample(&self, path: &Path, dt: f64) -> Result<Self, MotionError> {
         let duration = self.duration();
         let steps = libm::round(duration / dt);
@@ -101,10 +101,10 @@ impl Clip {
         self.rebuilt(path, dt, self.cycle, &rows)
     }
 
-    /// `qpos` on the cubic through the frames, at a time within the clip.
+    /// `qpos` on the cubic spline through the frames, at a time within the clip.
     fn cubic_at(&self, time: f64) -> Vec<f64> {
         let last = self.frames() - usize::from(self.cycle.is_none());
-        // rounding must not ask for what is behind the last frame
+        // rounding must not lead beyond the last frame
         let i = (libm::floor(time / self.dt + 1e-9) as usize).min(last - 1);
         let s = (time / self.dt - i as f64).clamp(0.0, 1.0);
         let (a, b) = (self.frame(i), self.frame_at(i as i64 + 1));
@@ -134,8 +134,8 @@ impl Clip {
         out
     }
 
-    /// The motion behind a Gaussian filter with this standard deviation, s. The ends of a clip that does not loop stay
-    /// where they are.
+    /// Filters the motion with a Gaussian of this standard deviation, s. The ends of a clip that does not loop stay
+    /// fixed.
     ///
     /// # Errors
     /// If a loop's neighboring cycles exceed the limits of a clip.
@@ -148,7 +148,7 @@ impl Clip {
         let count = self.frames() as i64;
         let rows: Vec<Vec<f64>> = (0..count)
             .map(|i| {
-                // at the ends of a clip the window narrows, which keeps it symmetric
+                // at the ends of a clip the window narrows to stay symmetric
                 let reach = if self.cycle.is_some() { reach } else { reach.min(i).min(count - 1 - i) };
                 let weights: Vec<f64> =
                     (-reach..=reach).map(|k| libm::exp(-0.5 * (k as f64 / sigma).powi(2))).collect();
@@ -174,11 +174,11 @@ impl Clip {
         self.rebuilt(path, self.dt, self.cycle, &rows)
     }
 
-    /// The motion as a mirror shows it that stands along the world's x and z axes: left and right change places.
+    /// Mirrors the motion at the world's x-z plane: left and right are exchanged.
     ///
     /// # Errors
-    /// If the clip is not the model's, or the model is not its own mirror image: a joint with "left" in its name needs a
-    /// partner with "right" whose axis is the mirror image, and any other joint an axis that is its own.
+    /// If the clip is for another model, or the model is not symmetric. A joint with "left" in its name needs a partner
+    /// with "right" whose axis is the mirror image. The axis of any other joint must be its own mirror image.
     pub fn mirror(&self, path: &Path, model: &Model) -> Result<Self, MotionError> {
         self.check_model(path, model)?;
         let partners = partners(path, model)?;
@@ -206,9 +206,9 @@ impl Clip {
         self.rebuilt(path, self.dt, cycle, &rows)
     }
 
-    /// The motion begun at the world's origin with the heading +x; heights stay.
+    /// Moves the motion to start at the world's origin with the heading +x. Heights stay.
     ///
-    /// A first joint that slides begins at 0.
+    /// If the first joint slides, it starts at 0.
     ///
     /// # Errors
     /// If the moved motion exceeds the limits of a clip.
@@ -238,7 +238,7 @@ impl Clip {
         self.rebuilt(path, self.dt, cycle, &rows)
     }
 
-    /// The motion elsewhere: the first body moved by so much, as far as its joints can.
+    /// Moves the motion: the first body by `by`, as far as its joints allow.
     pub(crate) fn moved(&self, path: &Path, model: &Model, by: DVec3) -> Result<Self, MotionError> {
         let mut rows = self.rows();
         for joint in model.joints.iter().filter(|joint| joint.body == model.joints[0].body) {
@@ -260,12 +260,12 @@ impl Clip {
         self.rebuilt(path, self.dt, cycle, &rows)
     }
 
-    /// The clip with its numbers rounded to six decimals, as files should have them: a micrometer, a microradian.
+    /// Rounds the clip's numbers to six decimals, as in files: a micrometer, a microradian.
     ///
     /// # Errors
-    /// If rounding takes a value past the limits of a clip.
+    /// If rounding moves a value beyond the limits of a clip.
     pub fn rounded(&self, path: &Path) -> Result<Self, MotionError> {
-        // adding zero makes -0 a 0
+        // adding zero turns -0 into 0
         let round = |value: f64| libm::round(value * 1e6) / 1e6 + 0.0;
         let rows: Vec<Vec<f64>> = self.rows().into_iter().map(|row| row.into_iter().map(round).collect()).collect();
         let cycle = self.cycle.map(|Cycle { pos, yaw }| Cycle { pos: pos.map(round), yaw: round(yaw) });
@@ -273,7 +273,7 @@ impl Clip {
     }
 }
 
-/// For each joint: its mirror image, and 1 or -1 for the angle's sign there.
+/// For each joint: its mirror joint, and the sign of the angle there (1 or -1).
 fn partners(path: &Path, model: &Model) -> Result<Vec<(usize, f64)>, MotionError> {
     let layout = Layout::of(model);
     let names: Vec<&str> = layout.joints().map(|(name, _)| name).collect();
@@ -291,7 +291,7 @@ fn partners(path: &Path, model: &Model) -> Result<Vec<(usize, f64)>, MotionError
             return wrong(format!("joints {name:?} and {other:?} are of different kinds"));
         }
         let [x, y, z] = axes[i].to_array();
-        // a mirror turns an axis of rotation into the opposite of its image
+        // a mirror negates the image of a rotation axis
         let image = match kind {
             JointKind::Hinge => DVec3::new(-x, y, -z),
             _ => DVec3::new(x, -y, z),
@@ -317,7 +317,7 @@ fn rest_axes(model: &Model) -> Vec<DVec3> {
     model.joints.iter().map(|joint| turns[joint.body] * DVec3::from_array(joint.axis)).collect()
 }
 
-/// A name with left and right exchanged.
+/// Exchanges left and right in a name.
 fn swapped(name: &str) -> String {
     const SIDES: [(&str, &str); 6] =
         [("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"), ("_l_", "_r_"), ("_L_", "_R_"), (".L", ".R")];

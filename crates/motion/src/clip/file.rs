@@ -9,7 +9,7 @@
 //! | `dt` | seconds between frames |
 //! | `joints` | name and kind of each joint in the order of `qpos`: `free`, `ball`, `slide` or `hinge` |
 //! | `frames` | `qpos` of each frame |
-//! | `fit` | distance from the recording, if known: mean distance of the parts, m, and mean angle, rad |
+//! | `fit` | distance from the recording, if known: mean distance of the bodies, m, and mean angle, rad |
 //! | `checksum` | checksum of all other values, independent of formatting |
 
 use super::{About, Clip, Cycle, Nearness};
@@ -22,10 +22,10 @@ use std::fmt::Write;
 use std::hash::Hasher;
 use std::path::Path;
 
-/// The version that is written.
+/// The version of written files.
 const VERSION: u64 = 1;
 
-/// A file before it is checked.
+/// The contents of a file before validation.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document {
@@ -54,7 +54,7 @@ enum Loop {
 }
 
 impl Clip {
-    /// Reads the bytes of a `.motion` file; the path is for messages.
+    /// Reads the bytes of a `.motion` file. The path is for messages.
     ///
     /// # Errors
     /// If the file is malformed, or its checksum is missing or wrong. The message names the line, the entry or the
@@ -110,7 +110,7 @@ impl Clip {
         Clip::new(path, about, Layout::new(file.joints), file.dt, cycle, &file.frames)
     }
 
-    /// The bytes of a `.motion` file. Reading them gives this clip again, to the last bit.
+    /// The bytes of a `.motion` file. Reading them gives the same clip, to the last bit.
     pub fn to_bytes(&self) -> Vec<u8> {
         let text = |text: &str| serde_json::to_string(text).expect("texts can be written");
         let About { name, model, source, license, .. } = &self.about;
@@ -155,7 +155,7 @@ impl Document {
 }
 
 impl Clip {
-    /// The checksum in the file that [`Clip::to_bytes`] writes.
+    /// The checksum in the output of [`Clip::to_bytes`].
     fn sum(&self) -> String {
         let About { name, model, source, license, fit } = &self.about;
         let mut sum = Checksum::default();

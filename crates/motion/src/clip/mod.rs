@@ -12,17 +12,17 @@ use marathon_physics::Model;
 use serde::Serialize;
 use std::path::Path;
 
-/// The largest number of a clip, m or rad. Larger ones are mistakes, and their differences would not stay finite.
+/// The largest number in a clip, m or rad. Larger ones are mistakes, and their differences would overflow.
 const LARGEST: f64 = 1e6;
 
-/// Where a clip comes from.
+/// Origin of a clip.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct About {
     /// Name of the motion.
     pub name: String,
     /// Name of the model whose joints move.
     pub model: String,
-    /// Who made the motion, and from what it was made.
+    /// Author of the motion, and its source.
     pub source: String,
     /// License under which it may be used.
     pub license: String,
@@ -33,9 +33,9 @@ pub struct About {
 /// Distance of a clip from its recording, as [`fit`](crate::fit) measures it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Nearness {
-    /// Mean distance of the parts, m.
+    /// Mean distance of the bodies, m.
     pub position: f64,
-    /// Mean angle of the parts, rad.
+    /// Mean angle of the bodies, rad.
     pub rotation: f64,
 }
 
@@ -48,28 +48,29 @@ impl Nearness {
     pub fn warning(&self) -> Option<String> {
         let (distance, degrees) = (1e2 * self.position, self.rotation.to_degrees());
         let far = self.position > FAR || self.rotation > TURNED;
-        let text =
-            || format!("its parts are {distance:.1} cm and {degrees:.0} degrees from the recording's in the mean");
+        let text = || {
+            format!("its bodies differ from the recording's by {distance:.1} cm and {degrees:.0} degrees on average")
+        };
         far.then(text)
     }
 }
 
-/// How far a looping clip gets in one cycle: frame 0 of the next cycle is frame 0 turned about the world's vertical
+/// Displacement of a looping clip per cycle. Frame 0 of the next cycle is frame 0 rotated about the world's vertical
 /// axis and then moved.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cycle {
-    /// Move along the world's x and y, m.
+    /// Displacement along the world's x and y, m.
     pub pos: [f64; 2],
-    /// Turn to the left, rad.
+    /// Rotation to the left, rad.
     pub yaw: f64,
 }
 
 /// A motion of one MJCF model: `qpos` at equal steps of time, in MuJoCo's layout.
 ///
-/// A looping clip of `n` frames lasts `n dt`: after its last frame comes its first, moved by [`Cycle`]. Any other clip
-/// lasts `(n - 1) dt`.
+/// A looping clip of `n` frames lasts `n dt`: its last frame is followed by the first one, moved by [`Cycle`]. Any
+/// other clip lasts `(n - 1) dt`.
 ///
-/// Between frames, positions are interpolated linearly and quaternions along great arcs. Velocities are central
+/// Between frames, positions are interpolated linearly, and quaternions along great arcs. Velocities are central
 /// differences at the frames, interpolated linearly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clip {
@@ -84,8 +85,9 @@ pub struct Clip {
 }
 
 impl Clip {
-    /// A clip of these frames, `layout.nq()` numbers each, `dt` seconds apart; it loops if it is given a cycle.
-    /// Quaternions more than 1e-5 off are normalized, and put on the side of their predecessors. The path is for messages.
+    /// Creates a clip from frames with `layout.nq()` numbers each, `dt` seconds apart. It loops if it has a cycle.
+    /// Quaternions more than 1e-5 off unit length are normalized. Their sign is chosen to match the previous frame. The
+    /// path is for messages.
     ///
     /// # Errors
     /// If there are fewer than two frames, a number is not finite, a quaternion is far from unit length, or the clip
@@ -127,7 +129,7 @@ impl Clip {
                         format!("the quaternion of {joint:?} is {:.3} long, expected unit length", q.length());
                     return Err(MotionError::frame(path, i, problem));
                 }
-                // digits rounded in a file stay as they are
+                // keep quaternions that were rounded in a file
                 if (q.length() - 1.0).abs() > 1e-5 {
                     q = q.normalize();
                 }
@@ -142,20 +144,20 @@ impl Clip {
         Ok(clip)
     }
 
-    /// Whether the clip is one of this model's.
+    /// Checks that the clip is for this model.
     ///
     /// # Errors
-    /// If the model's joints are others.
+    /// If the model has other joints.
     pub fn check_model(&self, path: &Path, model: &Model) -> Result<(), MotionError> {
         self.layout.check(path, model)
     }
 
-    /// Where the clip comes from.
+    /// Origin of the clip.
     pub fn about(&self) -> &About {
         &self.about
     }
 
-    /// The same motion with other words about it.
+    /// The same motion with another description.
     pub fn with_about(self, about: About) -> Self {
         Clip { about, ..self }
     }
@@ -170,7 +172,7 @@ impl Clip {
         self.dt
     }
 
-    /// How far one cycle gets; none if the clip does not loop.
+    /// Displacement per cycle. `None` if the clip does not loop.
     pub fn cycle(&self) -> Option<Cycle> {
         self.cycle
     }
@@ -201,7 +203,7 @@ impl Clip {
         self.frames.chunks(self.layout.nq()).map(<[f64]>::to_vec).collect()
     }
 
-    /// A clip with other frames.
+    /// Creates a clip with other frames.
     ///
     /// # Errors
     /// If there are fewer than two frames, or the frames exceed the limits of a clip.
@@ -210,7 +212,7 @@ impl Clip {
     }
 }
 
-/// A cycle needs a first joint that can travel as it says.
+/// Checks that the first joint can move as the cycle requires.
 fn check_cycle(path: &Path, cycle: &Cycle, layout: &Layout) -> Result<(), MotionError> {
     let [x, y] = cycle.pos;
     let found = || format!("[{x}, {y}, {}]", cycle.yaw);
@@ -228,7 +230,7 @@ fn check_cycle(path: &Path, cycle: &Cycle, layout: &Layout) -> Result<(), Motion
     }
 }
 
-/// Names of the joints that have a quaternion, and where in `qpos` it begins.
+/// Names of the joints with a quaternion, and the start of the quaternion in `qpos`.
 fn quaternions(layout: &Layout) -> impl Iterator<Item = (&str, usize)> {
     layout.joints.iter().filter_map(|joint| match joint.kind {
         JointKind::Free => Some((joint.name.as_str(), joint.qpos + 3)),
@@ -238,10 +240,10 @@ fn quaternions(layout: &Layout) -> impl Iterator<Item = (&str, usize)> {
 }
 
 impl Cycle {
-    /// Moves a pose `count` cycles on, or back if negative.
+    /// Moves a pose forward by `count` cycles, or back if negative.
     ///
     /// # Panics
-    /// If `qpos` is shorter than the layout's.
+    /// If `qpos` is too short for the layout.
     pub fn advance(&self, layout: &Layout, qpos: &mut [f64], count: i64) {
         match layout.joints.first().map(|joint| joint.kind) {
             Some(JointKind::Free) => {
@@ -256,7 +258,7 @@ impl Cycle {
         }
     }
 
-    /// The cycle that leads from one pose of the first joint to another, as far as a cycle can.
+    /// The cycle from one pose of the first joint to another, as far as a cycle can represent it.
     pub(crate) fn between(layout: &Layout, from: &[f64], to: &[f64]) -> Self {
         match layout.joints.first().map(|joint| joint.kind) {
             Some(JointKind::Free) => {
@@ -269,7 +271,8 @@ impl Cycle {
         }
     }
 
-    /// Where the world's origin is after `count` cycles: the sum of moves, each turned by the cycles before it.
+    /// Position of the world's origin after `count` cycles: the sum of displacements, each rotated by the previous
+    /// cycles.
     fn travel(&self, count: i64) -> DVec3 {
         let step = DVec3::new(self.pos[0], self.pos[1], 0.0);
         let half = 0.5 * wrap_angle(self.yaw);

@@ -9,33 +9,34 @@ use glam::DVec3;
 struct Moment {
     /// The frame before, within the clip.
     frame: usize,
-    /// Share of the way to the next frame, 0 to 1.
+    /// Fraction of the way to the next frame, 0 to 1.
     share: f64,
-    /// Cycles before this one.
+    /// Number of completed cycles.
     cycle: i64,
 }
 
 impl Clip {
-    /// Length of the clip, or of a cycle of it, s.
+    /// Length of the clip, or of one cycle, s.
     pub fn duration(&self) -> f64 {
         (self.frames() - usize::from(self.cycle.is_none())) as f64 * self.dt
     }
 
-    /// Share of the clip, or of its cycle, that is over at a time: 0 to 1.
+    /// Phase of the clip or of its cycle at a time: 0 to 1.
     pub fn phase(&self, time: f64) -> f64 {
         let share = time / self.duration();
         if self.cycle.is_some() { share - libm::floor(share) } else { share.clamp(0.0, 1.0) }
     }
 
-    /// Whether a clip that does not loop is over.
+    /// Whether a clip that does not loop has ended.
     pub fn is_over(&self, time: f64) -> bool {
         self.cycle.is_none() && time > self.duration()
     }
 
-    /// `qpos` at a time, s. A looping clip goes on into both directions; any other rests in its first and last frame.
+    /// `qpos` at a time, s. A looping clip continues in both directions. Any other clip stays at its first and last
+    /// frame.
     ///
     /// # Panics
-    /// If `out` is not `nq` numbers long.
+    /// If the length of `out` is not `nq`.
     pub fn qpos(&self, time: f64, out: &mut [f64]) {
         assert_eq!(out.len(), self.layout.nq(), "qpos has the length nq");
         let moment = self.moment(time);
@@ -46,11 +47,11 @@ impl Clip {
         }
     }
 
-    /// `qvel` at a time: a free joint has its linear velocity in the world's axes, m/s, and its angular velocity in the
-    /// body's axes, rad/s. Before and after a clip that does not loop all is at rest.
+    /// `qvel` at a time. A free joint has its linear velocity in the world's axes, m/s, and its angular velocity in the
+    /// body's axes, rad/s. All velocities are zero before and after a clip that does not loop.
     ///
     /// # Panics
-    /// If `out` is not `nv` numbers long.
+    /// If the length of `out` is not `nv`.
     pub fn qvel(&self, time: f64, out: &mut [f64]) {
         assert_eq!(out.len(), self.layout.nv(), "qvel has the length nv");
         if self.cycle.is_none() && !(0.0..=self.duration()).contains(&time) {
@@ -67,8 +68,8 @@ impl Clip {
         }
     }
 
-    /// `qacc` of a frame: the central difference of the velocities beside it, in the layout of `qvel`. At the ends of a clip
-    /// that does not loop it is one-sided.
+    /// `qacc` of a frame: the central difference of the neighboring velocities, in the layout of `qvel`. It is
+    /// one-sided at the ends of a clip that does not loop.
     ///
     /// # Panics
     /// If there is no such frame.
@@ -86,7 +87,7 @@ impl Clip {
         before.iter().zip(&after).map(|(before, after)| (after - before) / seconds).collect()
     }
 
-    /// Turns the linear velocity of a traveling free joint as the cycles do; its angular velocity is in body axes.
+    /// Rotates the linear velocity of a free root with the cycles. Its angular velocity is in body axes.
     pub(super) fn turn(&self, qvel: &mut [f64], cycles: i64) {
         if let (Some(cycle), Some(JointKind::Free)) = (self.cycle, self.layout.joints.first().map(|joint| joint.kind)) {
             let turned = crate::rotation::about_z(cycle.yaw * cycles as f64) * DVec3::from_slice(qvel);
@@ -110,7 +111,7 @@ impl Clip {
         }
     }
 
-    /// A frame of the endless motion: those of looping clips are moved by their cycles, others rest at the ends.
+    /// A frame of the endless motion. Frames of looping clips are moved by their cycles; others stay at the ends.
     pub(crate) fn frame_at(&self, frame: i64) -> Vec<f64> {
         let count = self.frames() as i64;
         match &self.cycle {
@@ -123,7 +124,7 @@ impl Clip {
         }
     }
 
-    /// Between two poses.
+    /// Interpolates between two poses.
     fn blend(&self, a: &[f64], b: &[f64], share: f64, out: &mut [f64]) {
         for (k, out) in out.iter_mut().enumerate() {
             *out = a[k] + share * (b[k] - a[k]);
@@ -133,7 +134,7 @@ impl Clip {
         }
     }
 
-    /// Velocities at the frames: central differences; one-sided ones at the ends of a clip that does not loop.
+    /// Computes velocities at the frames: central differences, one-sided at the ends of a clip that does not loop.
     pub(super) fn differentiate(&mut self) {
         let mut velocities = Vec::with_capacity(self.frames() * self.layout.nv());
         for i in 0..self.frames() as i64 {
@@ -148,7 +149,7 @@ impl Clip {
         self.velocities = velocities;
     }
 
-    /// The velocity that leads from `a` to `b`, with angular velocities in the body axes of `here`.
+    /// The velocity from `a` to `b`, with angular velocities in the body axes of `here`.
     fn difference(&self, a: &[f64], here: &[f64], b: &[f64], seconds: f64) -> Vec<f64> {
         let angular = |k: usize| {
             let [from, middle, to] = [a, here, b].map(|qpos| quat(&qpos[k..]).normalize());

@@ -14,9 +14,9 @@ use crate::skeleton::{Animation, Bone, Keyframe, Skeleton};
 use glam::{DQuat, DVec3};
 use std::path::Path;
 
-/// Frames further apart are milliseconds that were meant as seconds, and would make hours of a short file, s.
+/// Longest time between frames, s. Larger values are probably milliseconds, and would turn a short file into hours.
 const LONGEST_STEP: f64 = 1.0;
-/// More joints, or deeper ones, are not of a figure.
+/// Maximum number of joints, and maximum depth.
 const MOST_JOINTS: usize = 1000;
 
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,8 +1,9 @@
 //! DeepMimic's humanoid: JSON with 44 numbers per frame.
 //!
-//! `{"Loop": "wrap" | "none", "Frames": [[dt, root position (3), root quaternion (4), joints...], ...]}`: a quaternion
-//! `[w, x, y, z]` per spherical joint, an angle about z, rad, per knee and elbow. Axes: x forward, y up, z to the right. A
-//! frame's first number is the time to the next frame. In a looping motion the last frame is the first, farther on.
+//! `{"Loop": "wrap" | "none", "Frames": [[dt, root position (3), root quaternion (4), joints...], ...]}`, with a
+//! quaternion `[w, x, y, z]` per spherical joint, and an angle about z, rad, per knee and elbow. Axes: x forward, y up,
+//! z to the right. A frame's first number is the time to the next frame. In a looping motion the last frame repeats the
+//! first one, farther on.
 
 use super::{Reading, Recording, Up, upright};
 use crate::clip::About;
@@ -45,7 +46,7 @@ const JOINTS: [Joint; 15] = [
 /// Numbers of a frame.
 const WIDTH: usize = 44;
 
-/// A file before it is checked. Files also name the joints of each side, which is known here.
+/// The contents of a file before validation. Files also name the joints of each side, which are fixed here.
 #[derive(Deserialize)]
 struct Document {
     #[serde(rename = "Loop", default)]
@@ -54,17 +55,17 @@ struct Document {
     frames: Vec<Vec<f64>>,
 }
 
-/// Reads a motion of DeepMimic's humanoid; the path is for messages and names the motion.
+/// Reads a motion of DeepMimic's humanoid. The path is for messages and names the motion.
 ///
 /// # Errors
-/// If the text is no such motion: the message names the line or the frame.
+/// If the text is not such a motion: the message names the line or the frame.
 pub fn deepmimic(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
     Ok(read(path, bytes, &Reading::default())?.animation)
 }
 
 pub(super) fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recording, MotionError> {
     if let Some(up) = reading.up.filter(|up| *up != Up::Y) {
-        return Err(MotionError::value(path, "up", up, "y, which points up in all files of DeepMimic"));
+        return Err(MotionError::value(path, "up", up, "y, the up axis of all files of DeepMimic"));
     }
     let file: Document = limits::read_json(path, bytes)?;
     let looping = match file.looping.as_deref() {
@@ -99,7 +100,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recor
     Ok(Recording { animation, notes: notes.into_iter().collect() })
 }
 
-/// A vector in axes of which z points up.
+/// Converts a vector to axes with z up.
 fn z_up([x, y, z]: [f64; 3]) -> [f64; 3] {
     [x, -z, y]
 }
@@ -122,7 +123,7 @@ fn keyframe(path: &Path, i: usize, frame: &[f64]) -> Result<Keyframe, MotionErro
             }
             Nothing => [1.0, 0.0, 0.0, 0.0],
         };
-        // some of DeepMimic's own files have quaternions blended without normalizing them
+        // some of DeepMimic's files have blended quaternions that are not normalized
         let length = rotation.iter().map(|x| x * x).sum::<f64>().sqrt();
         if !((0.5..=1.5).contains(&length)) {
             let problem = format!("the quaternion that ends at number {at} is {length:.3} long, expected unit length");
@@ -135,8 +136,8 @@ fn keyframe(path: &Path, i: usize, frame: &[f64]) -> Result<Keyframe, MotionErro
     Ok(Keyframe { root: z_up([frame[1], frame[2], frame[3]]), rotations })
 }
 
-/// The keyframes at equal steps, those of the first frame, and this step, s. The last frame's time is not counted: nothing
-/// follows it.
+/// The keyframes at equal steps, taken from the first frame, and this step, s. The last frame's time is ignored,
+/// because no frame follows.
 fn even(path: &Path, frames: &[Vec<f64>], keyframes: Vec<Keyframe>) -> Result<(f64, Vec<Keyframe>), MotionError> {
     let between = &frames[..frames.len().saturating_sub(1)];
     if let Some(i) = between.iter().position(|frame| !(1e-4..=10.0).contains(&frame[0])) {

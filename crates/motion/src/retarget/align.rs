@@ -1,4 +1,4 @@
-//! How a skeleton at rest fits a model at rest: which way it faces, how its bones lie, how long its legs are.
+//! Alignment of a skeleton at rest with a model at rest: heading, directions of bones, length of legs.
 
 use super::mapping::{Mapping, Part};
 use crate::kinematics::Pose;
@@ -7,21 +7,21 @@ use crate::skeleton::{Skeleton, SkeletonPose};
 use glam::{DQuat, DVec3};
 use marathon_physics::Model;
 
-/// A skeleton at rest beside a model at rest.
+/// A skeleton and a model, both at rest.
 #[derive(Clone, Debug)]
 pub(super) struct Alignment {
     /// The model and the skeleton at rest.
     pub rest: Pose,
     pub source: SkeletonPose,
-    /// Turns the skeleton's front to the model's.
+    /// Rotates the skeleton's front to the model's.
     pub facing: DQuat,
-    /// Turns each part's body from the model's reference pose to the skeleton's rest pose.
+    /// Rotates each part's body from the model's reference pose to the skeleton's rest pose.
     pub align: Vec<DQuat>,
-    /// The only part that hangs from each part.
+    /// The only child part of each part.
     pub next: Vec<Option<usize>>,
-    /// Length of the model's legs over that of the skeleton's.
+    /// Length of the model's legs divided by that of the skeleton's.
     pub scale: f64,
-    /// Height of the model's hips over its ankles while it stands, m.
+    /// Height of the model's hips above its ankles while it stands, m.
     pub leg: f64,
     /// The last part of a leg.
     pub foot: usize,
@@ -64,12 +64,12 @@ impl Alignment {
     }
 }
 
-/// Where a part is.
+/// World position of a part.
 pub(super) fn place(pose: &Pose, part: &Part) -> DVec3 {
     pose.point(part.body, DVec3::from_array(part.local))
 }
 
-/// The only part that hangs from another, directly or by bodies that are no parts; none if there are several.
+/// The only child part of another part, directly or through bodies that are not parts. `None` if there are several.
 fn next_part(model: &Model, mapping: &Mapping, of: usize) -> Option<usize> {
     if !mapping.parts[of].whole {
         return None;
@@ -86,7 +86,7 @@ fn next_part(model: &Model, mapping: &Mapping, of: usize) -> Option<usize> {
     first.filter(|_| hanging.next().is_none())
 }
 
-/// The smallest turn from one direction to another.
+/// The smallest rotation from one direction to another.
 fn between(from: DVec3, to: DVec3) -> DQuat {
     if from.length() < 1e-2 || to.length() < 1e-2 {
         return DQuat::IDENTITY;

@@ -1,8 +1,8 @@
-//! The turning of the figure, which only the ground can change, and only where it is touched.
+//! Angular momentum of the character, which only ground contacts can change.
 //!
-//! In the air, nothing changes the angular momentum about the center of mass. On the ground, all that pushes the figure lies
-//! within what it stands on: the moment of gravity and of the accelerations about an edge of that cannot point beyond the edge.
-//! A recording that breaks this law asks a figure to fall over faster than anybody falls, or to turn on nothing.
+//! In the air, the angular momentum about the center of mass is constant. On the ground, all contact forces act within
+//! the support area. The moment of gravity and accelerations about an edge of that area therefore cannot point beyond
+//! the edge. A recording that violates this law requires impossible falls or rotations.
 
 use super::problem::{Problem, Row, Sink};
 use super::weight::{GRAVITY, center};
@@ -11,30 +11,30 @@ use crate::rotation::quat;
 use glam::DVec3;
 use marathon_physics::Model;
 
-/// Of what the ground cannot do, s^2/m^2: moments are per mass.
+/// Weight of impossible ground moments, s^2/m^2. Moments are per mass.
 const EDGE: f64 = 0.3;
-/// Of a change of the angular momentum per mass in the air, s^2/m^2.
+/// Weight of a change of the angular momentum per mass in the air, s^2/m^2.
 const TURN: f64 = 0.3;
-/// Edges of what the figure stands on, by their directions.
+/// Number of edge directions of the support area.
 const EDGES: usize = 8;
-/// How far beyond a contact the ground still pushes, m: contacts of motion capture are not more precise.
+/// Margin around contacts within which the ground still pushes, m. Contacts of motion capture are not more precise.
 const MARGIN: f64 = 0.03;
 
-/// A point of the figure, which has a share of its mass, and how it moves with each degree of freedom.
+/// A mass point of the character, and its motion with each degree of freedom.
 struct Point {
     share: f64,
     at: DVec3,
     by: Vec<(usize, DVec3)>,
 }
 
-/// Points with the mass and the inertia of a figure: six of each body.
+/// Points with the mass and the inertia of a character: six per body.
 fn points(model: &Model, pose: &Pose) -> Vec<Point> {
     let total: f64 = model.bodies.iter().map(|body| body.mass).sum();
     let mut points = Vec::new();
     for (i, body) in model.bodies.iter().enumerate().filter(|(_, body)| body.mass > 0.0) {
         let trace: f64 = body.inertia.iter().sum();
         for axis in 0..3 {
-            // along a principal axis: what the other two have more of
+            // along a principal axis: from the other two moments of inertia
             let second = (0.5 * trace - body.inertia[axis]).max(0.0);
             let reach = quat(&body.iquat) * DVec3::AXES[axis] * (3.0 * second / body.mass).sqrt();
             for offset in [reach, -reach] {
@@ -48,11 +48,11 @@ fn points(model: &Model, pose: &Pose) -> Vec<Point> {
     points
 }
 
-/// What moves the figure in a frame, gravity taken off: a force and its moment about the world's origin, per mass.
+/// Force and moment about the world's origin in a frame, without gravity, per mass.
 struct Wrench {
     force: DVec3,
     moment: DVec3,
-    /// How both change with each degree of freedom of the frame before, of the frame, and of the one after.
+    /// Derivatives of both with respect to each degree of freedom of the previous, current and next frame.
     by: Vec<[DVec3; 2]>,
 }
 
@@ -79,7 +79,7 @@ fn wrench(near: [&Vec<Point>; 3], nv: usize, dt: f64) -> Wrench {
 }
 
 impl Problem<'_> {
-    /// What the turning of figures with a free root may do.
+    /// Adds the limits on the rotation of characters with a free root.
     pub(super) fn balance_rows(&self, poses: &[Pose], sink: &mut Sink) {
         let factor = self.mapping.smooth * self.mapping.balance;
         if self.support.is_empty() || factor == 0.0 {
@@ -89,7 +89,7 @@ impl Problem<'_> {
         let all: Vec<Vec<Point>> = poses.iter().map(|pose| points(self.model, pose)).collect();
         for i in 1..poses.len().saturating_sub(1) {
             let Wrench { force, moment, by } = wrench([&all[i - 1], &all[i], &all[i + 1]], nv, self.dt);
-            // the moment about a line, and its changes, given those of a point of the line
+            // the moment about a line, and its derivatives, given those at a point of the line
             let along = |about: DVec3, axis: DVec3, weight: f64, moved: &[DVec3]| {
                 let mut row: Vec<f64> = by.iter().map(|[f, m]| weight * axis.dot(m - about.cross(*f))).collect();
                 for (row, moved) in row[nv..].iter_mut().zip(moved) {

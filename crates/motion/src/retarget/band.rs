@@ -1,4 +1,4 @@
-//! Symmetric positive definite matrices whose entries lie near the diagonal.
+//! Symmetric positive definite band matrices.
 
 /// The lower half of a matrix: entry `(i, j)` with `i - width < j <= i`.
 #[derive(Clone)]
@@ -9,24 +9,24 @@ pub(super) struct Band {
 }
 
 impl Band {
-    /// Zeros.
+    /// Creates a zero matrix.
     pub fn new(size: usize, width: usize) -> Self {
         Band { size, width, entries: vec![0.0; size * width] }
     }
 
-    /// Where the entry `(i, j)`, `j <= i`, is. Along a row, entries follow each other.
+    /// Index of the entry `(i, j)`, `j <= i`. Entries of a row are adjacent.
     fn at(&self, i: usize, j: usize) -> usize {
         i * self.width + self.width - 1 - (i - j)
     }
 
-    /// Adds to the entries `(i, j)` and `(j, i)`, which are one; callers visit each pair once.
+    /// Adds to the entries `(i, j)` and `(j, i)`, which are stored once. Callers visit each pair once.
     pub fn add(&mut self, i: usize, j: usize, value: f64) {
         let at = self.at(i.max(j), i.min(j));
         self.entries[at] += value;
     }
 
-    /// Replaces the matrix, with `damping` of its diagonal added, by its Cholesky factor, and solves for `b` in place.
-    /// False if the matrix is not positive definite.
+    /// Replaces the matrix, with `damping` times its diagonal added, by its Cholesky factor, and solves for `b` in
+    /// place. Returns false if the matrix is not positive definite.
     pub fn solve(&mut self, damping: f64, b: &mut [f64]) -> bool {
         let (n, w) = (self.size, self.width);
         for i in 0..n {
@@ -65,7 +65,7 @@ impl Band {
     }
 }
 
-/// The sum of products, in eight strands that the compiler can put side by side. Their order is fixed.
+/// The dot product, in eight independent sums for vectorization. Their order is fixed.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut strands = [0.0; 8];
     let (a, b) = (a.chunks_exact(8), b.chunks_exact(8));

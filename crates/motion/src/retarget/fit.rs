@@ -1,4 +1,4 @@
-//! How near a retargeted clip comes to its recording.
+//! Difference between a retargeted clip and its recording.
 
 use super::mapping::Mapping;
 use super::target::Targets;
@@ -13,18 +13,18 @@ use marathon_physics::Model;
 use serde::Serialize;
 use std::path::Path;
 
-/// What retargeting has left of a recording: at the model's own proportions, limits and ground keep parts from where the
-/// recording has them.
+/// Result of retargeting: the model's own proportions, limits and ground keep parts from matching the recording
+/// exactly.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Fit {
-    /// Mean distance of the mapping's parts from where the recording has them, as seen from the hips, m.
+    /// Mean distance of the mapping's parts from their targets, relative to the hips, m.
     pub position: f64,
-    /// Mean angle of their orientations, rad; parts without a weight of their orientation do not count.
+    /// Mean angle of their orientations, rad, without parts whose orientation has no weight.
     pub rotation: f64,
     /// Mean angle between the clip and the recording, for the trunk and the bones between parts, rad. It does not
     /// depend on the skeleton's rest pose.
     pub bones: f64,
-    /// Furthest distance, m.
+    /// Largest distance, m.
     pub furthest: Peak,
     /// Largest angle of a part whose orientation has a large weight, such as the trunk, the thighs and the feet, rad.
     pub most_turned: Peak,
@@ -41,11 +41,11 @@ const SHORT: f64 = 0.03;
 impl Fit {
     /// Warnings for the user, one sentence each. There are none if the clip is close to its recording.
     pub fn warnings(&self) -> Vec<String> {
-        let remedy = "look at the picture; if the figure lies, sinks or faces aside, pass --up or --floor";
+        let remedy = "look at the picture; if the character lies, sinks or faces aside, pass --up or --floor";
         let bones = Nearness { position: 0.0, rotation: self.bones };
         let near = Nearness { position: self.position, rotation: self.rotation }.warning();
         let bones = bones.warning().map(|_| {
-            format!("its bones point {:.0} degrees away from the recording's in the mean", self.bones.to_degrees())
+            format!("its bones differ from the recording's by {:.0} degrees on average", self.bones.to_degrees())
         });
         let peak = &self.most_turned;
         let crossed = (peak.value > CROSSED).then(|| {
@@ -62,10 +62,10 @@ impl Fit {
     }
 }
 
-/// Compares a clip with the animation that [`retarget`](super::retarget) has made it from. The path is for messages.
+/// Compares a clip with the animation that [`retarget`](super::retarget) created it from. The path is for messages.
 ///
 /// # Errors
-/// If the clip is not the model's, or has another number of frames than the animation.
+/// If the clip is for another model, or has another number of frames than the animation.
 pub fn fit(
     path: &Path,
     animation: &Animation,

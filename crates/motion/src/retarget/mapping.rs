@@ -1,23 +1,23 @@
-//! Mapping files: which joint of a skeleton moves which body of a model.
+//! Mapping files: assignment of skeleton joints to bodies of a model.
 //!
 //! | entry | meaning |
 //! |---|---|
 //! | `mapping` | version of the format, 1 |
 //! | `model` | name of the model |
-//! | `hips` | the bodies of the left and the right thigh, in this order: they tell the figure's front and the length of its legs |
-//! | `soles` | bodies that stand: what they touch does not slide |
-//! | `smooth` | factor on the smoothing of the result and on the laws of its center of mass and its balance; 1 if absent, 0 for recordings that are smooth already |
+//! | `hips` | the bodies of the left and the right thigh, in this order: they define the character's front and the length of its legs |
+//! | `soles` | bodies that stand: they do not slide while they touch the ground |
+//! | `smooth` | factor on the smoothing of the result and on the laws of its center of mass and its balance; default 1, 0 for recordings that are already smooth |
 //! | `parts` | by name of a body, geom or site of the model: the joint that it follows |
 //!
 //! A part has:
 //!
 //! | entry | meaning |
 //! |---|---|
-//! | `joint` | joint of the skeleton: its own name, or one of the names that many skeletons are understood by, such as `left_hip` |
-//! | `toward`, `share` | a second joint, and how far from the first to it the part's orientation lies, 0 to 1 |
-//! | `rotation` | weight of its orientation, 1/rad; 1 if absent; geoms and sites have none |
-//! | `position` | weight of its position, 1/m; 0 if absent |
-//! | `rest` | `[w, x, y, z]`, a turn of the part's reference orientation, in the model's axes, that makes it fit the skeleton's rest pose. If absent, the part is turned so that the bone to the next part points as in the skeleton |
+//! | `joint` | joint of the skeleton: its own name, or a general name that matches many skeletons, such as `left_hip` |
+//! | `toward`, `share` | a second joint, and the fraction from the first to the second at which the part's orientation lies, 0 to 1 |
+//! | `rotation` | weight of its orientation, 1/rad; default 1; geoms and sites have none |
+//! | `position` | weight of its position, 1/m; default 0 |
+//! | `rest` | `[w, x, y, z]`, a rotation of the part's reference orientation, in the model's axes, that matches the skeleton's rest pose. By default, the part is rotated so that the bone to the next part points as in the skeleton |
 
 use crate::error::MotionError;
 use crate::limits;
@@ -59,12 +59,12 @@ struct Row {
     rest: Option<[f64; 4]>,
 }
 
-/// A part of the model and what it follows.
+/// A part of the model and the joint that it follows.
 #[derive(Clone, Debug)]
 pub(crate) struct Part {
     /// Body, or the body that the geom or site is on.
     pub body: usize,
-    /// Where the part is in the body's frame: of a body, it is where it turns about its first joint.
+    /// Position of the part in the body's frame. For a body, that of its first joint.
     pub local: [f64; 3],
     /// Whether it is the body itself.
     pub whole: bool,
@@ -76,8 +76,7 @@ pub(crate) struct Part {
     pub rest: Option<[f64; 4]>,
 }
 
-/// The bodies of a model that stand, by index: those of the mapping that comes with Marathon, or else all that are called
-/// feet.
+/// The bodies of a model that stand, by index: those of Marathon's built-in mapping, or else all bodies named as feet.
 pub fn soles(model: &Model) -> Vec<usize> {
     let built_in = BUILT_IN.iter().find(|(name, _)| *name == model.name);
     let file = built_in.and_then(|(_, text)| serde_json::from_str::<Document>(text).ok());
@@ -88,22 +87,22 @@ pub fn soles(model: &Model) -> Vec<usize> {
     (1..model.bodies.len()).filter(|i| stands(&model.bodies[*i].name)).collect()
 }
 
-/// Which joint of a skeleton moves which body of a model.
+/// A mapping from the joints of a skeleton to the bodies of a model.
 #[derive(Clone, Debug)]
 pub struct Mapping {
-    /// Bodies come in the order of the model, before the points on them.
+    /// Parts in the order of the model's bodies, followed by points on them.
     pub(crate) parts: Vec<Part>,
     /// Parts of the thighs.
     pub(crate) hips: [usize; 2],
-    /// Bodies.
+    /// Bodies that stand.
     pub(crate) soles: Vec<usize>,
     /// Factor on the smoothing of the result, and on the laws of its center of mass and its balance.
     pub(crate) smooth: f64,
-    /// Another factor on the law of its balance.
+    /// Additional factor on the balance law.
     pub(crate) balance: f64,
 }
 
-/// Mappings that come with the crate, by the model's name. Their joints are those of [`roles`].
+/// Built-in mappings by the model's name. Their joints are those of [`roles`].
 const BUILT_IN: [(&str, &str); 3] = [
     ("marathon_man", include_str!("../../../../assets/motions/mappings/marathon_man.json")),
     ("humanoid", include_str!("../../../../assets/motions/mappings/humanoid.json")),
@@ -111,21 +110,22 @@ const BUILT_IN: [(&str, &str); 3] = [
 ];
 
 impl Mapping {
-    /// The mapping that comes with Marathon for a model, if there is one. The path, of the motion, is for messages.
+    /// The built-in mapping for a model, if there is one. The path of the motion is for messages.
     ///
     /// # Errors
-    /// If there is none, or the skeleton's joints go by names that are not understood.
+    /// If there is none, or the skeleton's joints have unknown names.
     pub fn built_in(path: &Path, skeleton: &Skeleton, model: &Model) -> Result<Self, MotionError> {
         let found = BUILT_IN.iter().find(|(name, _)| *name == model.name);
         let Some((_, text)) = found else {
             let known: Vec<&str> = BUILT_IN.iter().map(|(name, _)| *name).collect();
-            let problem = format!("there is no mapping for it, only for {}; write one", known.join(", "));
+            let problem = format!("it has no built-in mapping; only {} have one; write your own", known.join(", "));
             return Err(MotionError::model(path, &model.name, problem));
         };
         Self::parse(path, text.as_bytes(), skeleton, model)
     }
 
-    /// Every body with a joint follows the joint of its own name, by its orientation alone, and nothing is smoothed.
+    /// A mapping in which every body with a joint follows the joint of its own name, by orientation only, without
+    /// smoothing.
     ///
     /// # Errors
     /// If the skeleton lacks a body's name, or a hip is not a body.
@@ -155,9 +155,8 @@ impl Mapping {
         Ok(names)
     }
 
-    /// The same mapping with another factor on the law of balance, that only the ground, where it is touched, can change how the
-    /// figure turns. It is 1 at first. The larger, the more the result is what a figure could do, and the less what the recording
-    /// shows.
+    /// Sets the factor on the balance law: only ground contacts can change the angular momentum. The default is 1.
+    /// Larger values make the result more physical and less like the recording.
     pub fn balanced(self, factor: f64) -> Self {
         Mapping { balance: factor, ..self }
     }
@@ -167,10 +166,10 @@ impl Mapping {
         &self.soles
     }
 
-    /// Reads a mapping for a skeleton and a model; the path is for messages.
+    /// Reads a mapping for a skeleton and a model. The path is for messages.
     ///
     /// # Errors
-    /// If the text is malformed, or names what the skeleton or the model lacks.
+    /// If the text is malformed, or names something that the skeleton or the model lacks.
     pub fn parse(path: &Path, bytes: &[u8], skeleton: &Skeleton, model: &Model) -> Result<Self, MotionError> {
         let file: Document = limits::read_json(path, bytes)?;
         if file.mapping != 1 {
@@ -251,7 +250,7 @@ fn part(path: &Path, name: &str, row: &Row, skeleton: &Skeleton, model: &Model) 
     })
 }
 
-/// A body, geom or site by name: its body, its place there, and whether it is the body.
+/// Finds a body, geom or site by name: its body, its position there, and whether it is the body itself.
 fn find(path: &Path, name: &str, model: &Model) -> Result<(usize, [f64; 3], bool), MotionError> {
     if let Some(body) = model.bodies.iter().position(|body| body.name == name).filter(|body| *body > 0) {
         let joint = &model.joints[model.bodies[body].joint_start..][..model.bodies[body].joint_count];

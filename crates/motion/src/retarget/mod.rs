@@ -1,9 +1,9 @@
-//! From the motion of a skeleton to that of a model.
+//! Retargeting: from the motion of a skeleton to that of a model.
 //!
-//! The model's bones are turned as the skeleton's, which gives targets for orientations and positions at the model's own
-//! proportions. Inverse kinematics over all frames at once then finds joint angles that meet them within the joints' limits,
-//! above the ground and smoothly. What stands on the ground in that solution is held there in the next one, and the center of
-//! mass moves as gravity and the ground let it.
+//! Rotating the model's bones like the skeleton's gives targets for orientations and positions at the model's own
+//! proportions. Inverse kinematics over all frames at once then finds smooth joint angles that meet them within the
+//! joint limits and above the ground. In the next solution, feet that stand on the ground are held there, and the
+//! center of mass moves according to gravity and ground forces.
 
 mod align;
 mod balance;
@@ -36,19 +36,20 @@ use problem::Problem;
 use std::path::Path;
 use target::{Target, Targets};
 
-/// Frames beyond each end of a cycle, s: there the next cycle begins, so that ends meet.
+/// Time beyond each end of a cycle, s. The next cycle continues there, so that the ends match.
 const MARGIN: f64 = 0.4;
-/// Solutions over all frames; from the second on, what stands is held and parts do not overlap.
+/// Number of solutions over all frames. From the second on, standing soles are held and parts do not overlap.
 const PASSES: usize = 4;
-/// How much more the first solution is smoothed: limbs that found different ways in different frames come together.
+/// Additional smoothing of the first solution. It unites different solutions of single frames.
 const CALM: f64 = 8.0;
-/// Joints of people are hardly faster, rad/s.
+/// Maximum joint speed of people, rad/s.
 const FASTEST: f64 = 25.0;
 
-/// Retargets an animation to a model, frame for frame. A free root begins above the world's origin. The path is for messages.
+/// Retargets an animation to a model, frame for frame. A free root starts above the world's origin. The path is for
+/// messages.
 ///
 /// # Errors
-/// If the model cannot hold the result, for instance because it has no joints.
+/// If the model cannot hold the result, for example because it has no joints.
 pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Mapping) -> Result<Clip, MotionError> {
     if model.joints.is_empty() {
         return Err(MotionError::model(path, &model.name, "it has no joints"));
@@ -57,7 +58,7 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
     let dt = clip.dt();
     let targets = Targets::new(model, mapping, animation);
     let cycle = animation.cycle();
-    // a cycle's last frame is the first of the next
+    // a cycle's last frame is followed by the first of the next
     let count = clip.frames() + usize::from(cycle.is_some());
     let margin = if cycle.is_some() { libm::ceil(MARGIN / dt) as usize } else { 0 };
     // the normal matrix and its two copies need most of the memory
@@ -84,7 +85,7 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
         dt,
         calm: CALM * mapping.smooth,
     };
-    // frame after frame; around a cycle twice, so that its begin knows its end
+    // frame after frame; twice around a cycle, so that its start matches its end
     let mut guess = vec![model.qpos0.clone()];
     let mut frames: Vec<Vec<f64>> = Vec::with_capacity(all.len());
     for round in 0..if cycle.is_some() { 2 } else { 1 } {
@@ -96,7 +97,7 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
             frames.push(guess[0].clone());
         }
     }
-    // a figure whose root is fixed is carried by what it is fixed to
+    // a character with a fixed root is supported by its mount
     let travels = matches!(model.joints[0].kind, JointType::Free | JointType::Slide);
     let mut support = Vec::new();
     for pass in 0..PASSES {
@@ -119,7 +120,7 @@ pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Map
         };
     }
 
-    // where a limb slips past another one, it may be too fast
+    // a limb that slips past another one may be too fast
     let mut calm = mapping.smooth;
     while calm > 0.0 && calm < CALM * mapping.smooth && fastest(model, &frames, dt) > FASTEST {
         calm *= 2.0;
@@ -147,9 +148,9 @@ fn fastest(model: &Model, frames: &[Vec<f64>], dt: f64) -> f64 {
     speeds.fold(0.0, f64::max)
 }
 
-/// Makes the frames before and after a cycle what the cycle says.
+/// Sets the frames before and after a cycle from the cycle.
 fn repeat(cycle: &Cycle, layout: &Layout, frames: &mut [Vec<f64>], margin: usize) {
-    // the last frame within is the first of the next cycle
+    // the last inner frame is the first of the next cycle
     let count = frames.len() - 2 * margin - 1;
     for i in (0..margin).rev() {
         frames[i] = frames[i + count].clone();
@@ -161,7 +162,7 @@ fn repeat(cycle: &Cycle, layout: &Layout, frames: &mut [Vec<f64>], margin: usize
     }
 }
 
-/// Puts the first moving body where it should be, if it is free.
+/// Moves the first moving body to its target, if it is free.
 fn start(model: &Model, target: &Target, qpos: &mut [f64]) {
     if model.joints[0].kind == JointType::Free {
         qpos[..3].copy_from_slice(&target.root.0.to_array());
@@ -169,7 +170,7 @@ fn start(model: &Model, target: &Target, qpos: &mut [f64]) {
     }
 }
 
-/// Brings every joint within its limits.
+/// Clamps every joint to its limits.
 fn clamp(model: &Model, qpos: &mut [f64]) {
     for joint in model.joints.iter().filter(|joint| joint.limited) {
         if matches!(joint.kind, JointType::Hinge | JointType::Slide) {

@@ -1,4 +1,4 @@
-//! Inverse kinematics as one least-squares problem over all frames, by Levenberg and Marquardt's method.
+//! Inverse kinematics as one least-squares problem over all frames, by the Levenberg-Marquardt method.
 
 use super::band::Band;
 use super::mapping::Mapping;
@@ -11,35 +11,35 @@ use glam::DVec3;
 use marathon_physics::Model;
 use marathon_physics::model::JointType;
 
-/// Weights of what the mapping says nothing about. Orientations cost 1/rad.
+/// Weights of the terms that the mapping does not define. Orientations have 1/rad.
 mod weight {
-    /// Of the point between the hips, 1/m: along the ground, and up.
+    /// Point between the hips, 1/m: horizontal, and vertical.
     pub const HIPS: [f64; 2] = [3.0, 6.0];
-    /// Of a joint beyond its limit, 1/rad or 1/m.
+    /// Joint beyond its limit, 1/rad or 1/m.
     pub const LIMIT: f64 = 100.0;
-    /// Of depth below the ground, and of the height of what should touch it, 1/m.
+    /// Depth below the ground, and height of held soles, 1/m.
     pub const GROUND: f64 = 150.0;
-    /// Of a step's slide of what touches the ground, 1/m.
+    /// Sliding of held soles per step, 1/m.
     pub const SLIDE: f64 = 120.0;
-    /// Of the depth at which parts overlap, 1/m.
+    /// Depth of overlapping parts, 1/m.
     pub const APART: f64 = 60.0;
-    /// Of a joint's distance from its reference, 1/rad: decides where nothing else does.
+    /// Joint's distance from its reference, 1/rad: decides only between otherwise equal poses.
     pub const REST: f64 = 0.02;
-    /// Of accelerations, s^2: motions faster than about 12 Hz are noise.
+    /// Accelerations, s^2: motions faster than about 12 Hz are noise.
     pub const SMOOTH: f64 = 1.8e-4;
-    /// Of joint velocities, s: what is not asked for does not move.
+    /// Joint velocities, s: joints without a target do not move.
     pub const STILL: f64 = 0.004;
 }
-/// Joints stay this far within their limits, rad or m, so that the penalty's give does not show.
+/// Distance that joints keep from their limits, rad or m, because the penalty is soft.
 const LIMIT_MARGIN: f64 = 0.01;
-/// Ground and parts that are nearer than this are kept in mind, m.
+/// Distance below which ground and parts are taken into account, m.
 const NEAR: f64 = 0.1;
-/// How often a step is made again because it crosses bounds.
+/// Maximum number of repetitions of a step that crosses bounds.
 const CROSSINGS: usize = 4;
-/// Parts stay this far apart, m.
+/// Distance between parts, m.
 const APART_MARGIN: f64 = 0.005;
 
-/// Frames in a row, what they should be, and which points touch the ground.
+/// Consecutive frames, their targets, and their ground contacts.
 #[derive(Clone, Copy)]
 pub(super) struct Problem<'a> {
     pub model: &'a Model,
@@ -49,7 +49,7 @@ pub(super) struct Problem<'a> {
     pub targets: &'a [Target],
     /// Per frame and touch: whether it is held.
     pub held: &'a [Vec<bool>],
-    /// Per frame: what is on the ground; empty if the center of mass may do anything.
+    /// Per frame: support points. Empty if the center of mass is free.
     pub support: &'a [Vec<DVec3>],
     /// Seconds between frames.
     pub dt: f64,
@@ -57,24 +57,24 @@ pub(super) struct Problem<'a> {
     pub calm: f64,
 }
 
-/// A residual, and its derivatives by the variables, `frame * nv + dof`.
+/// A residual, and its derivatives with respect to the variables, `frame * nv + dof`.
 pub(super) enum Row<'r> {
-    /// Costs its square.
+    /// The cost is its square.
     Even(f64, &'r [(usize, f64)]),
-    /// Costs its square while it is negative: a distance from where it must not be.
+    /// The cost is its square while it is negative: the distance to a forbidden region.
     Bound(f64, &'r [(usize, f64)]),
 }
 
 pub(super) type Sink<'s> = dyn FnMut(Row) + 's;
 
-/// A row of [`Row::Bound`] that is kept.
+/// A stored [`Row::Bound`].
 struct Bound {
     residual: f64,
     by: Vec<(usize, f64)>,
     active: bool,
 }
 
-/// The sum of squares near the present frames, as a quadratic function of their change.
+/// The sum of squares near the current frames, as a quadratic function of their change.
 struct Quadratic {
     matrix: Band,
     slope: Vec<f64>,
@@ -89,7 +89,7 @@ impl Quadratic {
         }
     }
 
-    /// The change that makes it smallest. A bound that the change would cross counts from then on.
+    /// The change that minimizes it. A bound that the change would cross becomes active.
     fn step(&self, damping: f64) -> Option<Vec<f64>> {
         let mut active: Vec<bool> = self.bounds.iter().map(|bound| bound.active).collect();
         for round in 0.. {
@@ -115,7 +115,7 @@ impl Quadratic {
 }
 
 impl Problem<'_> {
-    /// Improves the frames from where they are; the sum of squares that is left.
+    /// Improves the frames. Returns the remaining sum of squares.
     pub fn solve(&self, frames: &mut [Vec<f64>], iterations: usize) -> f64 {
         let nv = self.model.nv;
         let size = frames.len() * nv;
@@ -160,7 +160,7 @@ impl Problem<'_> {
         cost
     }
 
-    /// A pose moved along its degrees of freedom, those of free and ball joints about the world's axes.
+    /// Moves a pose along its degrees of freedom. Free and ball joints rotate about the world's axes.
     fn moved(&self, qpos: &[f64], step: &[f64]) -> Vec<f64> {
         let mut out = qpos.to_vec();
         let mut pose = None;
@@ -285,12 +285,12 @@ impl Problem<'_> {
         }
     }
 
-    /// Whether a joint belongs to the first moving body, which carries the figure through the world.
+    /// Whether a joint belongs to the first moving body, which moves the character through the world.
     fn is_root(&self, joint: usize) -> bool {
         self.model.joints[joint].body == self.model.joints[0].body
     }
 
-    /// Nothing below the ground; what is held touches it and does not slide.
+    /// Keeps everything above the ground. Held soles touch it and do not slide.
     fn ground_rows(&self, i: usize, poses: &[Pose], sink: &mut Sink) {
         let (pose, nv) = (&poses[i], self.model.nv);
         let mut row = Vec::new();
@@ -306,7 +306,7 @@ impl Problem<'_> {
                 sink(if held { Row::Even(height, &row) } else { Row::Bound(height, &row) });
             }
             if held && i + 1 < poses.len() && self.held[i + 1][k] {
-                // the point that touches now is where it was in the next frame
+                // the body point that touches now, in the next frame
                 let local = pose.quat[touch.body].conjugate() * (lowest - pose.pos[touch.body]);
                 let there = poses[i + 1].point(touch.body, local);
                 for axis in 0..2 {
@@ -323,7 +323,7 @@ impl Problem<'_> {
         }
     }
 
-    /// Parts do not overlap.
+    /// Keeps parts from overlapping.
     fn apart_rows(&self, i: usize, pose: &Pose, sink: &mut Sink) {
         for pair in self.capsule_pairs {
             let separation = pair.separation(pose);
@@ -384,7 +384,7 @@ impl Problem<'_> {
     }
 }
 
-/// No further than a radian at once.
+/// Limits a rotation vector to one radian.
 fn limited(turn: DVec3) -> DVec3 {
     turn.clamp_length_max(1.0)
 }

@@ -1,5 +1,4 @@
-//! From a model to a skeleton: poses that move as the model does, with the bone lengths of the skeleton. Skinned meshes need
-//! them.
+//! Poses of a skeleton that moves like a model, with the skeleton's bone lengths. Skinned meshes need them.
 
 use super::align::{Alignment, place};
 use super::mapping::Mapping;
@@ -9,14 +8,14 @@ use crate::skeleton::{Keyframe, Skeleton, SkeletonPose};
 use glam::{DQuat, DVec3};
 use marathon_physics::Model;
 
-/// Poses a skeleton as a model moves.
+/// Poses a skeleton like a model.
 #[derive(Clone, Debug)]
 pub struct SkeletonPoser {
     skeleton: Skeleton,
     /// Orientation of each bone at rest, with the skeleton's front turned to the model's.
     rest: Vec<DQuat>,
     follows: Vec<Follows>,
-    /// Of each hip: the body, the place in it where the thigh turns, and the joint of the skeleton.
+    /// For each hip: the body, the position on it of the thigh's joint, and the skeleton's joint.
     hips: [(usize, DVec3, usize); 2],
     scale: f64,
     /// Offset of the skeleton's hips from the model's, in the frame of the body that carries the thighs.
@@ -27,20 +26,20 @@ pub struct SkeletonPoser {
 /// skeleton sets the scale.
 const OUT_OF_PROPORTION: f64 = 0.3;
 
-/// What turns a bone.
+/// Source of a bone's rotation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Follows {
-    /// A body, whose orientation times this is the bone's.
+    /// A body. Its orientation times this quaternion is the bone's orientation.
     Body(usize, DQuat),
-    /// Two other bones: the share of the way from the turn of the first to that of the second.
+    /// Two other bones: the fraction from the rotation of the first to that of the second.
     Between(usize, usize, f64),
     /// Its parent.
     Parent,
 }
 
 impl SkeletonPoser {
-    /// A skeleton that is to move as a model. A mapping's parts turn their joints; the joints between two that one part lies
-    /// between, such as those of a spine, share the turn; all others keep their rest pose.
+    /// Creates a poser for a skeleton and a model. The parts of a mapping rotate their joints. Joints between two
+    /// joints of one part, such as those of a spine, share the rotation. All others keep their rest pose.
     pub fn new(model: &Model, mapping: &Mapping, skeleton: &Skeleton) -> Self {
         let Alignment { rest: model_rest, source, facing, align, scale, leg, .. } =
             Alignment::new(model, mapping, skeleton);
@@ -82,12 +81,12 @@ impl SkeletonPoser {
         self.scale
     }
 
-    /// The skeleton, with its lengths times [`SkeletonPoser::scale`], while the model's bodies are at these places: position, m, and
-    /// orientation, `[w, x, y, z]`, of each. The skeleton's hips are where the model's are, or as much lower or higher as its legs are
-    /// shorter or longer.
+    /// The pose of the skeleton, with its lengths times [`SkeletonPoser::scale`], for these poses of the model's
+    /// bodies: position, m, and orientation, `[w, x, y, z]`. The skeleton's hips coincide with the model's, except for
+    /// a height offset if its legs are shorter or longer.
     ///
     /// # Panics
-    /// If there are fewer places than the model has bodies.
+    /// If there are fewer poses than the model has bodies.
     pub fn pose(&self, bodies: &[([f64; 3], [f64; 4])]) -> Keyframe {
         let bones = &self.skeleton.bones;
         let body = |i: usize| (DVec3::from_array(bodies[i].0), quat(&bodies[i].1).normalize());
@@ -141,7 +140,7 @@ fn figure(model: &Model, mapping: &Mapping, rest: &Pose, source: &SkeletonPose) 
     (ours > 1e-3 && theirs > 1e-3).then(|| ours / theirs)
 }
 
-/// The bones between one bone and another that it hangs from, or that hangs from it, from the first on; none otherwise.
+/// The bones between a bone and its ancestor or descendant, starting after `from`. Empty if neither is above the other.
 fn chain(skeleton: &Skeleton, from: usize, to: usize) -> Vec<usize> {
     let up = |from: usize, to: usize| {
         let mut bones = Vec::new();

@@ -1,4 +1,4 @@
-//! Where a model's parts should be, frame by frame: the model's own bones, turned as those of the skeleton.
+//! Target poses of a model's parts for each frame: the model's own bones, rotated like the skeleton's.
 
 use super::align::{Alignment, place};
 use super::mapping::{Mapping, Part};
@@ -10,7 +10,7 @@ use glam::{DQuat, DVec3};
 use marathon_physics::Model;
 use marathon_physics::model::JointType;
 
-/// Where the model's parts should be in one frame.
+/// Target poses of the model's parts in one frame.
 pub(super) struct Target {
     /// Orientation of each part's body.
     pub quat: Vec<DQuat>,
@@ -22,13 +22,13 @@ pub(super) struct Target {
     pub root: (DVec3, DQuat),
 }
 
-/// What stays the same over all frames.
+/// Data that is the same for all frames.
 pub(super) struct Targets<'a> {
     model: &'a Model,
     mapping: &'a Mapping,
     animation: &'a Animation,
     fits: Alignment,
-    /// Height of the model's and of the skeleton's ankles over the ground, m.
+    /// Height of the model's and of the skeleton's ankles above the ground, m.
     ankle: f64,
     source_ankle: f64,
 }
@@ -56,12 +56,12 @@ impl<'a> Targets<'a> {
         Targets { model, mapping, animation, fits, ankle, source_ankle }
     }
 
-    /// A position of the skeleton in the model's world, but for its height.
+    /// Converts a position of the skeleton to the model's world, except for its height.
     pub fn place(&self, pos: DVec3) -> DVec3 {
         self.fits.scale * (self.fits.facing * pos)
     }
 
-    /// The targets of a frame, which may be one of another cycle.
+    /// The targets of a frame, which may belong to another cycle.
     pub fn at(&self, frame: i64) -> Target {
         let pose = self.animation.pose(frame);
         let parts = &self.mapping.parts;
@@ -87,7 +87,7 @@ impl<'a> Targets<'a> {
         let [a, b] = self.mapping.hips.map(|hip| pose.pos[parts[hip].joint]);
         let mut hips = self.place(0.5 * (a + b));
         let height = 0.5 * (a.z + b.z) - self.source_ankle;
-        // the taller ankle counts as far as the figure stands
+        // the taller ankle counts in proportion to how upright the character stands
         let upright = (height * scale / leg.max(1e-3)).clamp(0.0, 1.0);
         hips.z = scale * height + self.ankle * upright + scale * self.source_ankle * (1.0 - upright);
         let shift = hips - middle;
@@ -126,7 +126,8 @@ impl<'a> Targets<'a> {
         bones.iter().map(|(from, to)| (ours(*to) - end(&ours, *from), theirs(*to) - end(&theirs, *from))).collect()
     }
 
-    /// The model with its parts' bodies turned so, whether its joints allow it or not. The first moving body is at the origin.
+    /// The model with its parts' bodies in these orientations, regardless of joint limits. The first moving body is at
+    /// the origin.
     fn bodies(&self, quats: &[DQuat]) -> (Vec<DVec3>, Vec<DQuat>) {
         let count = self.model.bodies.len();
         let (mut pos, mut turn) = (vec![DVec3::ZERO; count], self.fits.rest.quat.clone());
@@ -141,7 +142,7 @@ impl<'a> Targets<'a> {
             if parent == 0 {
                 continue;
             }
-            // a body turns about its joint
+            // a body rotates about its joint
             let hinge = joints.first().filter(|joint| joint.kind != JointType::Free);
             let local = hinge.map_or(DVec3::ZERO, |joint| DVec3::from_array(joint.pos));
             let anchor = self.fits.rest.point(i, local) - self.fits.rest.pos[parent];
@@ -159,7 +160,7 @@ fn last(next: &[Option<usize>], mut part: usize) -> usize {
     part
 }
 
-/// Whether a body hangs from another, or is it.
+/// Whether a body is a descendant of another, or the same.
 fn descends(model: &Model, mut body: usize, from: usize) -> bool {
     while body != from && body != 0 {
         body = model.bodies[body].parent;

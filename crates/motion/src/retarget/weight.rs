@@ -1,9 +1,9 @@
-//! The center of mass, which only gravity and the ground can accelerate.
+//! The center of mass, which only gravity and ground forces can accelerate.
 //!
-//! Recordings break this law, and retargeting does: a foot that is put where it belongs shifts the whole figure, and a flight
-//! at the proportions of another person is too high for its time. A figure with motors cannot follow that. In the air the
-//! center of mass is to fall; on the ground, which only pushes, it may be accelerated within a cone of friction.
-//! What the ground does to the turning of the figure is in [`balance`](super::balance).
+//! Recordings and retargeting both violate this law. A foot that is moved to its target shifts the whole character, and
+//! a flight at another person's proportions is too high for its duration. A character with motors cannot follow that.
+//! In the air, the center of mass should be in free fall. On the ground, which only pushes, its acceleration must lie
+//! within a friction cone. [`balance`](super::balance) covers the effect of the ground on rotation.
 
 use super::problem::{Problem, Row, Sink};
 use crate::ground::Touch;
@@ -11,26 +11,27 @@ use crate::kinematics::Pose;
 use glam::DVec3;
 use marathon_physics::Model;
 
-/// Of what the ground cannot do, s^2/m.
+/// Weight of impossible ground forces, s^2/m.
 const LAW: f64 = 0.03;
-/// Of the difference from gravity in the air, s^2/m: a flight is as high as its time asks for, or nobody lands in step.
+/// Weight of deviations from free fall, s^2/m. A flight must be as high as its duration requires, for a landing in
+/// step.
 const FALL: f64 = 0.12;
-/// Of accelerations on the ground, s^2/m: people move smoothly.
+/// Weight of accelerations on the ground, s^2/m: people move smoothly.
 const EFFORT: f64 = 0.001;
 /// Gravity, m/s^2.
 pub(super) const GRAVITY: f64 = 9.81;
 /// Friction of a foot on the ground, in directions along x and y.
 const FRICTION: f64 = 1.0;
-/// Height up to which a part may be on the ground, m.
+/// Maximum height of a part in ground contact, m.
 const NEAR: f64 = 0.02;
 
-/// Per frame: the points that may be on the ground; none in a flight.
+/// Support points per frame. Empty in a flight.
 pub(super) fn support(model: &Model, touches: &[Touch], frames: &[Vec<f64>]) -> Vec<Vec<DVec3>> {
     let near = |pose: Pose| touches.iter().map(|touch| touch.lowest(&pose)).filter(|point| point.z <= NEAR).collect();
     frames.iter().map(|frame| near(Pose::of(model, frame))).collect()
 }
 
-/// Center of mass of a pose, and how it moves with each degree of freedom.
+/// Center of mass of a pose, and its derivative with respect to each degree of freedom.
 pub(super) fn center(model: &Model, pose: &Pose) -> (DVec3, Vec<DVec3>) {
     let total: f64 = model.bodies.iter().map(|body| body.mass).sum();
     let (mut at, mut by) = (DVec3::ZERO, vec![DVec3::ZERO; model.nv]);
@@ -43,7 +44,7 @@ pub(super) fn center(model: &Model, pose: &Pose) -> (DVec3, Vec<DVec3>) {
 }
 
 impl Problem<'_> {
-    /// What the center of mass of figures with a free root may do.
+    /// Adds the limits on the center of mass of characters with a free root.
     pub(super) fn weight_rows(&self, poses: &[Pose], sink: &mut Sink) {
         let (model, nv) = (self.model, self.model.nv);
         let factor = self.mapping.smooth;

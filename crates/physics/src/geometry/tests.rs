@@ -434,8 +434,8 @@ fn degenerate_poses_agree_with_mujoco() {
         let differ = wrong.len();
         println!("{shapes:?}: {touching} touch, {ties} ties, {differ} differ, {wrong_single} in single precision");
         assert!(touching > STATES / 2 && 20 * ties < STATES, "{shapes:?}: {touching} touch, {ties} ties");
-        // poses that are turned by less than a right angle have rounding errors in single precision
-        // an axis in a face meets two edges at the distance 0, give or take a rounding error
+        // single precision rounds poses that are not turned by right angles;
+        // an axis in a face meets two edges at the distance 0, up to rounding
         let allowed = if matches!(shapes, [Capsule(..), Box(_)]) { 1 } else { 0 };
         if 100 * wrong.len() > allowed * STATES || 100 * wrong_single > 3 * STATES {
             let some = wrong[..wrong.len().min(4)].join("\n");

@@ -35,8 +35,8 @@ fn other_weight(model: &Model, mounts: &[BodyMount], bodies: [usize; 2], k: usiz
     bodies.iter().map(share).sum()
 }
 
-/// Whether a constraint on points of two bodies, with the inverse weight `diag` of its rows, is much harder than the
-/// effective mass of such a point on free bodies.
+/// Whether a constraint on points of two bodies is hard: the inverse weight `diag` of its rows is far below that of a
+/// point that moves and turns.
 pub(crate) fn is_hard(model: &Model, mounts: &[BodyMount], bodies: [usize; 2], diag: f64) -> bool {
     let own: f64 = bodies.iter().map(|b| model.bodies[*b].invweight0[0]).sum();
     diag < HARD * (own + other_weight(model, mounts, bodies, 0))
