@@ -115,7 +115,7 @@ fn errors_say_what_to_do() {
         "{text}"
     );
     let text = import("bend.txt", "ant", "a.motion", 1);
-    assert!(text.contains("there is no mapping for it, only for marathon_man, humanoid, walker2d"), "{text}");
+    assert!(text.contains("there is no built-in mapping for it, only for marathon_man, humanoid, walker2d"), "{text}");
     let text = import("bend.txt", "humanoid", "a.json", 2);
     assert!(text.contains("--out is a.json, expected a name that ends with .motion"), "{text}");
     for balance in ["-1", "101", "nan"] {

@@ -111,7 +111,7 @@ fn edits_beyond_what_a_clip_holds_are_refused() {
     let error = clip(1.0, 2).looped(path, 0.1).unwrap_err().to_string();
     assert_eq!(
         error,
-        "far.motion: frames of a loop: found 2, expected three or more, of which the last is the first again"
+        "far.motion: frames of a loop: found 2, expected three or more, of which the last repeats the first"
     );
     assert_eq!(clip(1.0, 3).looped(path, 0.1).unwrap().frames(), 2);
     let far = clip(1.9e6, 20);
@@ -321,7 +321,10 @@ fn of_mappings() {
     }
     let ant = model("ant");
     let error = Mapping::built_in("m.txt".as_ref(), deepmimic.skeleton(), &ant).unwrap_err().to_string();
-    assert!(error.contains("there is no mapping for it, only for marathon_man, humanoid, walker2d"), "{error}");
+    assert!(
+        error.contains("there is no built-in mapping for it, only for marathon_man, humanoid, walker2d"),
+        "{error}"
+    );
 }
 
 /// The number of a DeepMimic frame that stands still at this place.

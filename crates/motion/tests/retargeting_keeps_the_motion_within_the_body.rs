@@ -57,7 +57,7 @@ fn leaps_of_the_whole_figure_and_floating_are_warned_of() {
     });
     assert!(leap.contains("root moves at") && leap.contains("m/s"), "{leap}");
     let floats = warnings(&|_, frame| add(frame, 2, 0.5));
-    assert!(floats.contains("no frame is on the ground: the lowest point is"), "{floats}");
+    assert!(floats.contains("no frame touches the ground: the lowest point is"), "{floats}");
     // half a turn about the vertical axis
     let turned = warnings(&|i, frame| {
         if i >= 20 {

@@ -57,7 +57,7 @@ pub fn line(report: &Report) -> String {
 /// What retargeting has left of a recording, in a line.
 pub fn fit_line(fit: &Fit) -> String {
     format!(
-        "its parts are {:.1} cm and {:.0} degrees from the recording's in the mean; {} is {:.0} cm away in frame {}",
+        "its parts are {:.1} cm and {:.0} degrees from the recording's on average; {} is {:.0} cm away in frame {}",
         1e2 * fit.position,
         fit.rotation.to_degrees(),
         fit.furthest.name,

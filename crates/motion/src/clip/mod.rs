@@ -48,9 +48,8 @@ impl Nearness {
     pub fn warning(&self) -> Option<String> {
         let (distance, degrees) = (1e2 * self.position, self.rotation.to_degrees());
         let far = self.position > FAR || self.rotation > TURNED;
-        let text = || {
-            format!("its bodies differ from the recording's by {distance:.1} cm and {degrees:.0} degrees on average")
-        };
+        let text =
+            || format!("its parts are {distance:.1} cm and {degrees:.0} degrees from the recording's on average");
         far.then(text)
     }
 }

@@ -118,7 +118,7 @@ impl Mapping {
         let found = BUILT_IN.iter().find(|(name, _)| *name == model.name);
         let Some((_, text)) = found else {
             let known: Vec<&str> = BUILT_IN.iter().map(|(name, _)| *name).collect();
-            let problem = format!("it has no built-in mapping; only {} have one; write your own", known.join(", "));
+            let problem = format!("there is no built-in mapping for it, only for {}; write one", known.join(", "));
             return Err(MotionError::model(path, &model.name, problem));
         };
         Self::parse(path, text.as_bytes(), skeleton, model)
