@@ -25,7 +25,7 @@ pub enum CliError {
     /// An error of a picture.
     #[error(transparent)]
     Render(#[from] RenderError),
-    /// A process that plays is lost; the learned policy is saved.
+    /// A rollout process is lost. The learned policy is saved.
     #[error("{cause}\n{advice}")]
     Lost {
         /// The first failure.
@@ -45,13 +45,13 @@ pub enum CliError {
     /// A check has found faults; its report is on stdout.
     #[error("{0}")]
     Found(String),
-    /// The user pressed Ctrl-C; the text says what is saved and how to continue.
+    /// The user pressed Ctrl-C. The text says what is saved and how to continue.
     #[error("interrupted: {0}")]
     Interrupted(String),
 }
 
 impl CliError {
-    /// For `map_err` after an operation on a file.
+    /// Converts an I/O error of an operation on a file, for `map_err`.
     pub fn io(path: &Path, action: &'static str) -> impl FnOnce(std::io::Error) -> Self {
         move |source| RunError::io(path, action)(source).into()
     }

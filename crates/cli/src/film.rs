@@ -1,5 +1,5 @@
-//! A policy before the camera: agents that play on after they fall, so that one sees how, and the clip that they follow as
-//! their ghost.
+//! Films of a policy. Agents keep playing after a fall, so that you see it, and the clip that they follow is their
+//! ghost.
 
 use crate::error::CliError;
 use clap::ValueEnum;
@@ -14,17 +14,17 @@ use marathon_runs::{Play, Setting, text};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Seconds that are still shown after the last agent has fallen.
+/// Time shown after the last agent has fallen, s.
 const AFTERMATH: f64 = 1.0;
 /// Seconds over which the speed in the captions is averaged.
 const SPEED_WINDOW: f64 = 0.5;
 
-/// Where a ghost is drawn.
+/// Placement of a ghost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Ghost {
-    /// Where the clip is: translucent, in and about the figure.
+    /// At the clip's position: translucent, overlapping the character.
     Inside,
-    /// In the lane behind the figure.
+    /// In the lane behind the character.
     Beside,
 }
 
@@ -34,7 +34,7 @@ pub struct Shot {
     /// Pixels of a frame.
     pub width: usize,
     pub height: usize,
-    /// Seconds.
+    /// Length, s.
     pub length: f64,
     /// Frames of a strip.
     pub frames: usize,
@@ -42,18 +42,18 @@ pub struct Shot {
     pub fps: f64,
 }
 
-/// Who plays.
+/// The agents of a film.
 pub struct Cast {
     pub agents: usize,
     /// Seed of the environments.
     pub seed: u64,
-    /// Seconds that pass before the picture begins.
+    /// Time before the picture starts, s.
     pub start: f64,
-    /// The clip beside or about each agent.
+    /// Placement of the clip as a ghost of each agent.
     pub ghost: Option<Ghost>,
 }
 
-/// What was shown.
+/// Properties of the film.
 #[derive(Serialize)]
 pub struct Report {
     #[serde(serialize_with = "text::path_json")]
@@ -67,7 +67,8 @@ pub struct Report {
     distance_mean: f64,
     speed_mean: f64,
     falls: usize,
-    /// Mean absolute difference of the hinges' angles from those of the clip until the falls, rad; with a ghost.
+    /// Mean absolute difference between the angles of the hinges and those of the clip until the falls, rad. Only with
+    /// a ghost.
     #[serde(skip_serializing_if = "Option::is_none")]
     joint_error: Option<f64>,
     /// Mean distance of the root from that of the clip until the falls, m; with a ghost.
@@ -76,7 +77,7 @@ pub struct Report {
 }
 
 impl Shot {
-    /// Frames in a row of a strip.
+    /// Frames per row of a strip.
     pub fn columns(&self) -> usize {
         self.frames.div_ceil(self.frames.div_ceil(8))
     }
@@ -92,7 +93,7 @@ impl Shot {
         Ok(())
     }
 
-    /// Seconds from the beginning to each frame, in ascending order.
+    /// Time of each frame, s, in ascending order.
     pub fn times(&self) -> Vec<f64> {
         match self.format {
             Format::Png => {
@@ -110,7 +111,7 @@ impl Shot {
 /// Plays the policies of all roles with their best actions and films them.
 ///
 /// # Errors
-/// If a ghost is asked for and the agents follow no clip, or the picture cannot be written.
+/// If a ghost is requested but the agents follow no clip, or the picture cannot be written.
 pub fn shoot(policies: &[Policy], spec: &Spec, shot: &Shot, cast: &Cast, out: &Path) -> Result<Report, CliError> {
     shot.check()?;
     interrupt::install("leaving without a picture")?;
@@ -128,7 +129,7 @@ pub fn shoot(policies: &[Policy], spec: &Spec, shot: &Shot, cast: &Cast, out: &P
         while decision < (time / spec.dt).round() as usize {
             stage.step()?;
             decision += 1;
-            // the camera sees every decision, also those between the frames of a strip
+            // the camera is updated at every decision, also between the frames of a strip
             camera.update(&stage.frame()?, spec.dt);
         }
         let frame = stage.frame()?;
@@ -162,7 +163,7 @@ pub fn shoot(policies: &[Policy], spec: &Spec, shot: &Shot, cast: &Cast, out: &P
     })
 }
 
-/// Agents at play.
+/// Agents in simulation.
 struct Stage<'a> {
     play: Play<'a>,
     scene: Scene,
@@ -171,26 +172,26 @@ struct Stage<'a> {
     /// Seconds between decisions.
     dt: f64,
     decisions: usize,
-    /// Distance of each agent, m; it stands still after a fall.
+    /// Distance of each agent, m. It stays constant after a fall.
     distances: Vec<f64>,
     /// Distances of the last decisions, the newest at the end, for the speed.
     recent: Vec<f64>,
-    /// When each agent fell, decisions.
+    /// Time at which each agent fell, decisions.
     fallen: Vec<Option<usize>>,
     ghost: Option<Ghost>,
-    /// With a ghost.
+    /// Errors, with a ghost.
     errors: Option<Errors>,
 }
 
-/// How far agents are from the clip.
+/// Differences between the agents and the clip.
 struct Errors {
-    /// Where the hinges are in `qpos`.
+    /// Indices of the hinges in `qpos`.
     hinges: Vec<usize>,
-    /// How many numbers of `qpos` are the root's position.
+    /// Number of `qpos` entries for the root's position.
     root: usize,
-    /// Mean absolute difference of the hinges' angles, rad, and distance of the roots, m: means over the agents now.
+    /// Mean absolute difference of the hinge angles, rad, and distance of the roots, m: current means over the agents.
     now: [f64; 2],
-    /// The same of agents that have not fallen, added up over decisions, and how many these are.
+    /// The same for agents that have not fallen, summed over decisions, and their number.
     sum: [f64; 2],
     count: usize,
 }
@@ -203,7 +204,7 @@ impl Errors {
         Errors { hinges: hinges.collect(), root, now: [0.0; 2], sum: [0.0; 2], count: 0 }
     }
 
-    /// Those of an agent.
+    /// The differences of an agent.
     fn of(&self, own: &[f64], clip: &[f64]) -> [f64; 2] {
         let gaps = self.hinges.iter().map(|k| (own[*k] - clip[*k]).abs());
         let way = own.iter().zip(clip).take(self.root).map(|(a, b)| (a - b) * (a - b));
@@ -247,7 +248,7 @@ impl<'a> Stage<'a> {
         Ok(stage)
     }
 
-    /// Shows the agents' grounds as they are now.
+    /// Updates the ground of the agents.
     fn look_at_grounds(&mut self) -> Result<(), CliError> {
         let (play, fields) = (&mut self.play, self.fields);
         let grounds = (0..self.fallen.len()).map(|agent| play.grounds(agent, fields)).collect::<Result<_, _>>()?;
@@ -267,7 +268,7 @@ impl<'a> Stage<'a> {
                 self.distances[i] += f64::from(step.forward[i]);
             }
         }
-        // one of several roles may build
+        // one of several roles may build the ground
         if !self.play.spec().roles.is_empty() {
             self.look_at_grounds()?;
         }
@@ -279,7 +280,7 @@ impl<'a> Stage<'a> {
         self.compare()
     }
 
-    /// Measures how far the agents are from the clip.
+    /// Measures the differences between the agents and the clip.
     fn compare(&mut self) -> Result<(), CliError> {
         let Some(errors) = &mut self.errors else { return Ok(()) };
         errors.now = [0.0; 2];
@@ -317,7 +318,7 @@ impl<'a> Stage<'a> {
         self.distances.iter().sum::<f64>() / self.distances.len() as f64
     }
 
-    /// Mean speed of late, m/s.
+    /// Recent mean speed, m/s.
     fn speed(&self) -> f64 {
         let seconds = (self.recent.len() - 1) as f64 * self.dt;
         if seconds > 0.0 { (self.distance() - self.recent[0]) / seconds } else { 0.0 }
@@ -349,7 +350,7 @@ impl<'a> Stage<'a> {
 }
 
 impl Report {
-    /// It in a line.
+    /// The report in one line.
     pub fn line(&self) -> String {
         let bytes = std::fs::metadata(&self.out).map_or(0, |m| m.len());
         let who = if self.agents == 1 { "the agent".into() } else { format!("{} agents", self.agents) };

@@ -21,13 +21,13 @@ use error::CliError;
 use marathon_runs::terminal;
 use std::ffi::OsString;
 
-/// Advice for `marathon study`, which was a command.
+/// Advice for the former command `marathon study`.
 const STUDIES: &str = "the studies are in marathon-studies: `cargo run --release -p marathon-studies -- --help`";
 
-/// Runs the command with the words of a command line, the first being the program's own name, and returns its exit code.
+/// Runs the command with the words of a command line, the first of which is the program's name. Returns its exit code.
 ///
-/// It is a function for the Python package, which includes the command; nothing else uses this library. Call it at the end of
-/// a process: long commands replace the handler of Ctrl-C.
+/// The Python package, which includes the command, calls this function. Call it at the end of a process: long commands
+/// replace the handler of Ctrl-C.
 pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
     let words: Vec<OsString> = words.into_iter().collect();
     program::set_name(words.first());
@@ -35,7 +35,7 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(args) => match dispatch(&args) {
             Ok(()) => 0,
             Err(error) => {
-                // an interrupted run has printed its summary already, a check its report
+                // an interrupted run has already printed its summary, and a check its report
                 let json = args.json && !matches!(error, CliError::Interrupted(_) | CliError::Found(_));
                 terminal::failed(&error, json);
                 error.exit_code()
@@ -46,7 +46,7 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
     terminal::finish(code)
 }
 
-/// Adds the place of the studies to the error of `marathon study`.
+/// Adds the new place of the studies to the error of `marathon study`.
 fn with_advice(mut answer: clap::Error) -> clap::Error {
     if answer.get(ContextKind::InvalidSubcommand) == Some(&ContextValue::String("study".into())) {
         answer.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![STUDIES.into()]));

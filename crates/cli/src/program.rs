@@ -15,7 +15,7 @@ pub fn set_name(called: Option<&OsString>) {
         CALLED.get_or_init(|| called.into());
     }
     let called = called.map(|name| name.to_string_lossy()).unwrap_or_default();
-    // a bare name was found by the shell and will be found again
+    // the shell found a bare name and will find it again
     PROGRAM.get_or_init(|| if called.is_empty() { "marathon".into() } else { word(&called) });
 }
 

@@ -91,7 +91,7 @@ fn an_interrupted_distillation_goes_on_with_the_same_bits() {
     assert!(sent.success());
     let rest: Vec<String> = lines.collect();
     assert_eq!(child.wait().unwrap().code(), Some(130), "{rest:?}");
-    assert!(rest.iter().any(|line| line.contains("the same command goes on")), "{rest:?}");
+    assert!(rest.iter().any(|line| line.contains("the same command continues")), "{rest:?}");
     let notes = path.join("parts.safetensors.unfinished");
     assert!(notes.exists());
     // the policy written so far is usable
@@ -110,7 +110,7 @@ fn an_interrupted_distillation_goes_on_with_the_same_bits() {
 
     let resumed = finish([words("parts.safetensors", "3"), vec!["--threads".into(), "2".into()]].concat());
     assert!(resumed.status.success(), "{}", stderr(&resumed));
-    assert!(stderr(&resumed).contains("going on with Hopper-v0"), "{}", stderr(&resumed));
+    assert!(stderr(&resumed).contains("continuing Hopper-v0"), "{}", stderr(&resumed));
     assert!(!notes.exists());
     let whole = finish(words("whole.safetensors", "3"));
     assert!(whole.status.success(), "{}", stderr(&whole));

@@ -143,7 +143,7 @@ fn a_clip_never_replaces_what_it_is_made_from() {
         ["motion", "import", "walk.motion", "--model", "humanoid", "--out", "walk.motion"],
     ] {
         let text = fail(temp.path(), 2, &args);
-        assert!(text.contains("walk.motion, which is read; expected another file"), "{text}");
+        assert!(text.contains("walk.motion, which is also the input; expected another file"), "{text}");
     }
     assert_eq!(std::fs::read(temp.path().join("walk.motion")).unwrap(), before);
 }

@@ -11,16 +11,16 @@ use crate::atomic::Pending;
 use crate::error::RenderError;
 use crate::image::{Image, same_size};
 
-/// Frames looked at before the palette is fixed; what follows shows the same floor, sky and runner.
+/// Frames that determine the palette. Later frames show the same floor, sky and character.
 const STUDY: usize = 24;
-/// Pixels that the quantizer learns from, in all; vivid ones are taken ten times as often.
+/// Number of pixels that the quantizer learns from. Vivid ones are sampled ten times as often.
 const LESSONS: usize = 120_000;
-/// Spread between the largest and the smallest channel from which on a pixel is vivid.
+/// Difference between the largest and the smallest channel above which a pixel is vivid.
 const VIVID: u8 = 50;
 /// Palette entries for colors; one more is "as before".
 const COLORS: usize = 255;
 const UNCHANGED: u8 = 255;
-/// Largest ordered-dither offset in 8-bit steps: enough to break bands in the sky, little enough to compress well.
+/// Largest ordered-dither offset in 8-bit steps: enough to hide bands in the sky, and small enough to compress well.
 const DITHER: i32 = 3;
 /// Browsers slow a GIF down to 10 frames per second when its delays are under 2 hundredths of a second.
 const FPS: [f64; 2] = [0.1, 50.0];
@@ -36,9 +36,9 @@ pub struct GifWriter {
 }
 
 enum Stage {
-    /// Collecting frames for the palette; the file is still empty.
+    /// Collects frames for the palette. The file is still empty.
     Studying(File),
-    /// Writing; a [`Film`] is large, so it lives on the heap.
+    /// Writes frames. A [`Film`] is large, so it lives on the heap.
     Writing(Box<Film>),
 }
 
@@ -101,7 +101,7 @@ impl GifWriter {
         self.pending.commit()
     }
 
-    /// Fixes the palette and writes the frames that waited for it.
+    /// Fixes the palette and writes the frames collected so far.
     fn start(&mut self) -> Result<(), RenderError> {
         let Stage::Studying(file) = &self.stage else { return Ok(()) };
         let file = file.try_clone().map_err(RenderError::io(self.pending.path(), "cannot write"))?;
@@ -127,7 +127,7 @@ impl GifWriter {
             true => Some([0, 0, image.width(), image.height()]),
             false => changed_area(&film.previous, &indices, image.width()),
         };
-        // a frame must exist for its time to pass, even if nothing moved
+        // a GIF needs a frame for time to pass, even without changes
         let [left, top, right, bottom] = changed.unwrap_or([0, 0, 1, 1]);
 
         let mut buffer = Vec::with_capacity((right - left) * (bottom - top));
@@ -157,7 +157,7 @@ impl GifWriter {
         Ok(())
     }
 
-    /// Hundredths of a second for the next frame; rounding does not add up over the film.
+    /// Duration of the next frame in hundredths of a second. Rounding errors do not add up over the film.
     fn delay(&self) -> u16 {
         let end_of = |frames: usize| (100.0 * frames as f64 / self.fps).round();
         (end_of(self.count + 1) - end_of(self.count)) as u16
@@ -171,7 +171,7 @@ fn refused(pending: &Pending, error: gif::EncodingError) -> RenderError {
     }
 }
 
-/// Left, top, right, bottom of what differs; `None` if nothing does.
+/// Left, top, right, bottom of the changed area. `None` without changes.
 fn changed_area(old: &[u8], new: &[u8], width: usize) -> Option<[usize; 4]> {
     let mut area: Option<[usize; 4]> = None;
     for (y, (a, b)) in old.chunks_exact(width).zip(new.chunks_exact(width)).enumerate() {
@@ -183,24 +183,24 @@ fn changed_area(old: &[u8], new: &[u8], width: usize) -> Option<[usize; 4]> {
     area
 }
 
-/// 255 colors and the nearest of them to any color.
+/// 255 colors, and the nearest of them for any color.
 struct Palette {
     quantizer: NeuQuant,
     /// 256 RGB entries, the last unused.
     table: Vec<u8>,
-    /// Index by color at 6 bits per channel, found when first asked for.
+    /// Index by color at 6 bits per channel, computed on first use.
     nearest: Vec<Option<u8>>,
 }
 
 impl Palette {
     fn learn(frames: &[Image]) -> Self {
-        // every frame lends pixels from a grid that shifts from frame to frame
+        // every frame contributes pixels from a grid that shifts from frame to frame
         let pixels: usize = frames.iter().map(|frame| frame.rgb().len() / 3).sum();
         let step = pixels.div_ceil(LESSONS).max(1);
         let mut lessons = Vec::with_capacity(4 * (pixels / step + frames.len()));
         for (i, frame) in frames.iter().enumerate() {
             for (k, pixel) in frame.rgb().chunks_exact(3).enumerate() {
-                // the runner is small but colorful, and its shades matter more than the floor's
+                // the character is small but colorful, and its shades matter more than the floor's
                 let (low, high) = pixel.iter().fold((255_u8, 0_u8), |(low, high), &c| (c.min(low), c.max(high)));
                 let vivid = high - low > VIVID;
                 let stride = if vivid { (step / 10).max(1) } else { step };
@@ -210,7 +210,7 @@ impl Palette {
                 }
             }
         }
-        // the quantizer walks its lessons in strides and wants a few of them
+        // the quantizer walks its samples in strides and needs a minimum number
         while lessons.len() < 4 * 1024 {
             lessons.extend_from_within(..);
         }
@@ -220,7 +220,7 @@ impl Palette {
         Self { quantizer, table, nearest: vec![None; 1 << 18] }
     }
 
-    /// Palette indices of a picture, with ordered dither fixed to the screen so that it does not crawl.
+    /// Palette indices of a picture, with ordered dither fixed to the screen so that it does not flicker.
     fn map(&mut self, image: &Image) -> Vec<u8> {
         let width = image.width();
         let pixel = |(i, rgb): (usize, &[u8])| {

@@ -1,4 +1,4 @@
-//! Files appear whole or not at all: they are written beside their final name, then renamed.
+//! Files are written completely or not at all: under a temporary name next to their final one, then renamed.
 
 use std::fs::{self, File, OpenOptions};
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::error::RenderError;
 
-/// A file in the making; dropped without [`commit`](Self::commit), it is removed again.
+/// A file under construction. Without [`commit`](Self::commit), dropping it removes the file.
 pub(crate) struct Pending {
     path: PathBuf,
     temporary: PathBuf,
@@ -24,7 +24,7 @@ impl Pending {
             let source = std::io::Error::new(std::io::ErrorKind::InvalidInput, "the path names no file");
             return Err(RenderError::io(path, "cannot create")(source));
         }
-        // not the file's own name with more to it: that may be as long as names can be
+        // not based on the file's own name, which may have the maximum length
         let temporary = path.with_file_name(format!(".marathon-{}-{unique}.tmp", std::process::id()));
 
         let file = File::create(&temporary).map_err(RenderError::io(path, "cannot create"))?;
@@ -54,7 +54,7 @@ impl Pending {
 impl Drop for Pending {
     fn drop(&mut self) {
         if !self.committed {
-            // nothing to report to: the caller already has the error that led here
+            // the caller already has the error that led here
             let _ = fs::remove_file(&self.temporary);
         }
     }

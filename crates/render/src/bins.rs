@@ -1,4 +1,4 @@
-//! A uniform 2-D grid of lists: which solids may matter at a point of the picture, the light's view or the ground.
+//! A uniform 2-D grid of lists: the solids that may matter at a point of the picture, the light's view or the ground.
 
 /// An axis-aligned rectangle: lower corner, upper corner.
 pub(crate) type Rect = [[f64; 2]; 2];
@@ -42,7 +42,7 @@ impl Bins {
         bins
     }
 
-    /// Bins over the union of `rects`, with about square cells.
+    /// Creates about square bins over the union of `rects`.
     pub fn covering(rects: &[Rect], most: usize) -> Self {
         let mut area = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
         for rect in rects {
@@ -80,7 +80,7 @@ impl Bins {
         for i in 0..2 {
             let (first, last) = (cell(i, rect[0][i]), cell(i, rect[1][i]));
             let most = (self.count[i] - 1) as f64;
-            // on the upper edge of the area a rectangle still belongs to the last cell
+            // a rectangle on the upper edge of the area belongs to the last cell
             if last < 0.0 || first > most + 1.0 || first.is_nan() || last.is_nan() {
                 return;
             }

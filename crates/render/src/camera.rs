@@ -1,4 +1,4 @@
-//! The camera, and one that follows a runner.
+//! The camera, and a camera that follows a character.
 
 use glam::DVec3;
 
@@ -30,7 +30,7 @@ impl Camera {
     pub(crate) fn basis(&self) -> Basis {
         let eye = DVec3::from_array(self.eye);
         let forward = (DVec3::from_array(self.target) - eye).try_normalize().unwrap_or(DVec3::Y);
-        // straight down or up: the picture's top points along +y
+        // looking straight down or up, the picture's top points along +y
         let right = forward.cross(DVec3::Z).try_normalize().unwrap_or(DVec3::X);
         let up = right.cross(forward);
         let slope = half_angle_slope(self.fovy);
@@ -38,14 +38,14 @@ impl Camera {
     }
 }
 
-/// `tan(fovy / 2)` for `fovy` in degrees, kept to angles that a picture can have.
+/// `tan(fovy / 2)` for `fovy` in degrees, clamped to possible angles.
 fn half_angle_slope(fovy: f64) -> f64 {
     libm::tan(fovy.clamp(1.0, 150.0).to_radians() / 2.0)
 }
 
-/// Tracks the agents along x from the side, slightly elevated, and along y those who stray far from where they were first.
+/// Follows the agents along x from the side, slightly elevated, and along y if they stray far from their start.
 ///
-/// The tracker is a critically damped second-order filter on position and velocity: it ignores the bobbing of a gait
+/// The tracker is a critically damped second-order filter on position and velocity. It ignores the bobbing of a gait
 /// and has no lag at constant speed.
 #[derive(Clone, Debug)]
 pub struct Follow {
@@ -53,14 +53,15 @@ pub struct Follow {
     pub fovy: f64,
     /// Angle above the horizon, degrees.
     pub elevation: f64,
-    /// Angle about z, degrees: 0 looks along +y (x to the right), positive turns the camera ahead of the runner.
+    /// Angle about z, degrees: 0 looks along +y (x to the right), positive angles turn the camera ahead of the
+    /// character.
     pub azimuth: f64,
-    /// Factor on the distance; below 1 is closer.
+    /// Factor on the distance. Below 1 is closer.
     pub zoom: f64,
     aspect: f64,
     radius: f64,
     row: f64,
-    /// Where the agents were first, along y, m.
+    /// First position of the agents along y, m.
     first: Option<f64>,
     state: Option<State>,
 }
@@ -68,20 +69,20 @@ pub struct Follow {
 #[derive(Clone, Copy, Debug)]
 struct State {
     x: Tracker,
-    /// How far beyond [`STRAYED`] the agents are from where they were first, m.
+    /// Distance of the agents from their first position, beyond [`STRAYED`], m.
     y: Tracker,
     z: Tracker,
     spread: Tracker,
 }
 
-/// Way along y up to which the camera stays where it is, m: runners sway.
+/// Distance along y within which the camera does not move, m: characters sway.
 const STRAYED: f64 = 1.0;
 
 #[derive(Clone, Copy, Debug)]
 struct Tracker {
     value: f64,
     rate: f64,
-    /// Where the target was at the end of the last step.
+    /// Target at the end of the last step.
     target: f64,
 }
 
@@ -96,7 +97,7 @@ impl Tracker {
         let steps = (omega * dt / 0.1).ceil().clamp(1.0, 1000.0);
         let h = dt / steps;
         for i in 0..steps as usize {
-            // the target moves evenly within the step; held still, it would pull the camera ahead
+            // the target moves evenly within the step; a fixed target would pull the camera ahead
             let error = self.target + (target - self.target) * (i as f64 / steps) - self.value;
             self.value += h * (self.rate + 2.0 * omega * error);
             self.rate += h * omega * omega * error;
@@ -106,10 +107,10 @@ impl Tracker {
 }
 
 impl Follow {
-    /// A camera for frames of `agents` agents and pictures of `width` x `height` pixels.
+    /// Creates a camera for frames of `agents` agents and pictures of `width` x `height` pixels.
     pub fn new(scene: &Scene, agents: usize, width: usize, height: usize) -> Self {
         let row = scene.spacing().abs() * agents.saturating_sub(1) as f64;
-        // look down on a row more steeply, so that the front does not hide the back
+        // look down more steeply on a row, so that the front does not hide the back
         let elevation = if row > 0.0 { 20.0 } else { 10.0 };
         Self {
             fovy: 32.0,
@@ -126,7 +127,7 @@ impl Follow {
 
     /// The camera for `frame`, `dt` seconds after the previous one.
     ///
-    /// The first call jumps to the agents, and so does one after more than a second or back in time.
+    /// The first call jumps to the agents. So does a call after more than a second, or back in time.
     pub fn update(&mut self, frame: &Frame, dt: f64) -> Camera {
         let agents = frame.agents();
         let (mut low, mut high, mut y, mut z) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0);

@@ -1,13 +1,13 @@
-//! What can go wrong between a `qpos` and a file.
+//! Errors on the way from `qpos` to a file.
 
 use std::path::{Path, PathBuf};
 
 use marathon_physics::budget::OverBudget;
 
-/// Any failure of this crate. Those that concern a file name its path.
+/// An error of this crate. Errors of a file name its path.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
-    /// A `qpos` of another model, most likely.
+    /// The length of a `qpos` is wrong, usually because it belongs to another model.
     #[error("agent {agent}: qpos has {found} values, expected {expected} for model '{model}'")]
     QposLength {
         /// Index of the agent in the frame.
@@ -32,9 +32,9 @@ pub enum RenderError {
     /// A width or height that no output format here can hold.
     #[error("image size {width}x{height} is out of range: each side must be 1..={max}")]
     Size {
-        /// Width asked for, pixels.
+        /// Requested width, pixels.
         width: usize,
-        /// Height asked for, pixels.
+        /// Requested height, pixels.
         height: usize,
         /// Largest side.
         max: usize,
@@ -49,13 +49,13 @@ pub enum RenderError {
         /// Width and height of the first frame.
         expected: [usize; 2],
     },
-    /// A strip or video of nothing.
+    /// A strip or film without frames.
     #[error("{what}: no frames")]
     NoFrames {
         /// The strip or the path of the file.
         what: String,
     },
-    /// A file name whose extension says nothing about the format.
+    /// A file name whose extension is not a supported format.
     #[error("{}: unknown extension '{found}', expected png, gif or mp4; did you mean '{nearest}'?", path.display())]
     Extension {
         /// The path given.
@@ -65,12 +65,12 @@ pub enum RenderError {
         /// The most similar valid extension.
         nearest: &'static str,
     },
-    /// A frame rate that the format cannot carry.
+    /// A frame rate that the format does not support.
     #[error("{}: {fps} frames per second is out of range, expected {min}..={max}", path.display())]
     Fps {
         /// File to be written.
         path: PathBuf,
-        /// The rate asked for.
+        /// The requested rate.
         fps: f64,
         /// Lowest rate.
         min: f64,
@@ -92,9 +92,9 @@ pub enum RenderError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What was being done.
+        /// The attempted action.
         action: &'static str,
-        /// Why it failed.
+        /// Its cause.
         source: std::io::Error,
     },
     /// The PNG or GIF encoder refused.
@@ -102,7 +102,7 @@ pub enum RenderError {
     Encode {
         /// The file.
         path: PathBuf,
-        /// The encoder's words.
+        /// The encoder's message.
         reason: String,
     },
     /// There is no `ffmpeg`.
@@ -114,7 +114,7 @@ pub enum RenderError {
     NoFfmpeg {
         /// File to be written.
         path: PathBuf,
-        /// The program looked for.
+        /// The program's name.
         program: String,
     },
     /// `ffmpeg` ended with an error.
@@ -124,9 +124,9 @@ pub enum RenderError {
         path: PathBuf,
         /// The program run.
         program: String,
-        /// How it ended.
+        /// How it exited.
         status: String,
-        /// The end of what it wrote to stderr.
+        /// The end of its stderr output.
         stderr: String,
     },
 }

@@ -1,4 +1,4 @@
-//! The floor: a checker and distance marks, filtered over each pixel's footprint so that they stay calm in motion.
+//! The floor: a checker and distance marks, filtered over each pixel's footprint to avoid flicker.
 
 use std::io::Write;
 
@@ -7,15 +7,15 @@ use glam::DVec3;
 use crate::font;
 use crate::palette::{self, linear};
 
-/// Where distance marks are painted.
+/// Layout of the distance marks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Marks {
     pub visible: bool,
-    /// Side of a checker square and distance between numbers, m: 1 for agents of about human size.
+    /// Side of a checker square and distance between numbers, m. It is 1 for agents of about human size.
     pub cell: f64,
     /// Decimals of the numbers.
     pub decimals: usize,
-    /// Upper edge of the numbers, m; they lie between the camera and the runner.
+    /// Upper edge of the numbers, m. They lie between the camera and the character.
     pub y: f64,
 }
 
@@ -49,7 +49,7 @@ pub(crate) struct Ground {
 /// Width of a painted line and of one font dot, in cells.
 const LINE: f64 = 0.035;
 const DOT: [f64; 2] = [0.022, 0.052];
-/// Numbers of every fifth cell are this much larger.
+/// Size factor of the numbers at every fifth cell.
 const FIFTH: f64 = 1.5;
 
 impl Ground {
@@ -78,7 +78,7 @@ impl Ground {
             return color;
         }
 
-        // a line across at every fifth cell, the one at 0 in its own color
+        // a line at every fifth cell; the one at 0 has its own color
         let nearest = 5.0 * (at[0] / 5.0).round();
         let line = if nearest == 0.0 { self.start } else { self.fifth };
         let width = if nearest == 0.0 { 1.6 * LINE } else { LINE };
@@ -93,7 +93,7 @@ impl Ground {
         let index = at[0].round();
         let scale = if index % 5.0 == 0.0 { FIFTH } else { 1.0 };
         let dot = DOT.map(|d| d * scale);
-        // y runs away from the reader, rows of a glyph toward the reader
+        // y points away from the viewer, rows of a glyph toward the viewer
         let row = (self.marks.y / self.marks.cell - at[1]) / dot[1];
         let rows = size[1] / dot[1];
         if row < -rows || row > font::HEIGHT as f64 + rows || size[0] > 0.5 {
@@ -112,7 +112,7 @@ impl Ground {
         let text = &text[..length];
 
         let columns = (length * font::ADVANCE - 1) as f64;
-        // beside the line of a fifth cell, else in the middle of its meter mark
+        // next to the line of a fifth cell, else centered on its meter mark
         let shift = if index % 5.0 == 0.0 { -(1.2 * LINE) / dot[0] } else { 0.5 * columns };
         let column = (at[0] - index) / dot[0] + shift;
         let wide = size[0] / dot[0];
@@ -194,7 +194,7 @@ mod tests {
             }
             sum
         };
-        // '7' has less ink than '8', two digits more than one, and half way between there is none
+        // '7' has less ink than '8', two digits more than one, and there is none between numbers
         assert!(ink(7.0) > 10.0 && ink(8.0) > 1.2 * ink(7.0) && ink(12.0) > ink(7.0));
         assert_eq!(ground.number([7.5, ground.marks.y - 0.1], size), 0.0);
     }

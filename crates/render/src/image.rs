@@ -18,7 +18,7 @@ pub struct Image {
     rgb: Vec<u8>,
 }
 
-/// Where a caption goes.
+/// Corner of a caption.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Corner {
     /// Top left.
@@ -32,7 +32,7 @@ pub enum Corner {
 }
 
 impl Image {
-    /// A picture of one color.
+    /// Creates a picture of one color.
     ///
     /// # Errors
     /// [`RenderError::Size`] unless both sides are in `1..=MAX_SIDE`.
@@ -41,12 +41,13 @@ impl Image {
         Ok(Self { width, height, rgb: color.repeat(width * height) })
     }
 
-    /// A black picture of a size that has been checked.
+    /// Creates a black picture of a checked size.
     pub(crate) fn black(width: usize, height: usize) -> Self {
         Self { width, height, rgb: vec![0; 3 * width * height] }
     }
 
-    /// A picture from pixels that were drawn elsewhere: `height * width * 3` bytes, red, green and blue, row by row.
+    /// Creates a picture from pixels that were drawn elsewhere: `height * width * 3` bytes, red, green and blue, row by
+    /// row.
     ///
     /// # Errors
     /// [`RenderError::Size`] unless both sides are in `1..=MAX_SIDE` and there are as many bytes as pixels need.
@@ -90,7 +91,7 @@ impl Image {
 
     /// Writes one line of ASCII with its top left corner at `(x, y)`; a dot of the 5x7 font is `scale` pixels wide.
     ///
-    /// What lies outside the picture is cut off.
+    /// Text outside the picture is cut off.
     pub fn text(&mut self, x: i64, y: i64, scale: usize, color: [u8; 3], text: &str) {
         let scale = scale.max(1);
         for (place, character) in text.chars().enumerate() {
@@ -103,7 +104,8 @@ impl Image {
         }
     }
 
-    /// Writes lines on a dark translucent panel in a corner; sized by the picture's height, narrow pictures by width.
+    /// Writes lines on a dark translucent panel in a corner. The text size depends on the picture's height, or on the
+    /// width of narrow pictures.
     pub fn caption<S: AsRef<str>>(&mut self, corner: Corner, lines: &[S]) {
         let longest = lines.iter().map(|line| line.as_ref().chars().count()).max().unwrap_or(0);
         if longest == 0 {
@@ -167,7 +169,7 @@ impl Image {
         Image { width, height: self.height, rgb }
     }
 
-    /// Writes a PNG file, whole or not at all.
+    /// Writes a PNG file completely or not at all.
     ///
     /// # Errors
     /// [`RenderError::Io`] and [`RenderError::Encode`], with the path.

@@ -33,11 +33,11 @@ pub struct Pose {
     pub geoms: Vec<GeomPose>,
     /// Position of the first moving body, m.
     pub root: [f64; 3],
-    /// Center of mass of the kinematic tree of the first joint, m; props in trees of their own do not count.
+    /// Center of mass of the kinematic tree of the first joint, m. Props in their own trees do not count.
     pub com: [f64; 3],
 }
 
-/// Computes the pose of every geom. `agent` is only used to name the culprit in errors.
+/// Computes the pose of every geom. Errors name the index `agent`.
 pub(crate) fn pose(model: &Model, qpos: &[f64], agent: usize) -> Result<Pose, RenderError> {
     check(model, qpos, agent)?;
     let kinematics::Pose { pos, quat, .. } = kinematics::Pose::of(model, qpos);

@@ -1,4 +1,4 @@
-//! Looks at a gait without a GPU: a small ray caster that turns `qpos` into PNG, strips, GIF and MP4.
+//! Draws a gait without a GPU: a small ray caster that turns `qpos` into PNG, strips, GIF and MP4.
 //!
 //! ```no_run
 //! use marathon_render::{Corner, Follow, Recorder, Renderer, Scene, status_line};
@@ -18,7 +18,7 @@
 //! # }
 //! ```
 //!
-//! A picture depends on its inputs alone: not on the number of threads, and not on the platform's math library.
+//! A picture only depends on its inputs: not on the number of threads or the platform's math library.
 
 mod animation;
 mod atomic;

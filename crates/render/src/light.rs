@@ -6,7 +6,7 @@ use crate::bins::Rect;
 use crate::palette::{self, linear};
 use crate::shape::{Shape, Solid};
 
-/// Direction to the sun, not yet normalized: from the camera's side, behind the runner, high.
+/// Direction to the sun, not yet normalized: from the camera's side, behind the character, high.
 const SUN: [f64; 3] = [-0.55, -0.62, 1.25];
 /// Tangent of the sun's angular radius; larger than the real one, for soft shadows.
 const SUN_SIZE: f64 = 0.035;
@@ -40,21 +40,21 @@ impl Light {
         Self { sun, across, disk, sun_color: SUN_POWER * DVec3::from_array(SUN_COLOR), horizon, zenith }
     }
 
-    /// Color of the sky; below the horizon it is the haze.
+    /// Color of the sky. Below the horizon it is the haze.
     #[inline]
     pub fn sky(&self, d: DVec3) -> DVec3 {
         let height = d.z.max(0.0);
-        // quick near the horizon, slow toward the zenith, without a power function
+        // a fast change near the horizon, a slow one toward the zenith, without a power function
         self.horizon.lerp(self.zenith, 1.0 - 1.0 / (1.0 + 5.0 * height))
     }
 
-    /// Coordinates across the sun's direction.
+    /// Coordinates perpendicular to the sun's direction.
     #[inline]
     pub fn project(&self, p: DVec3) -> [f64; 2] {
         [p.dot(self.across[0]), p.dot(self.across[1])]
     }
 
-    /// Bounds, across the sun's direction, of what a solid can shade down to `floor`.
+    /// Bounds, perpendicular to the sun's direction, of the area that a solid can shade down to `floor`.
     pub fn shadow_rect(&self, solid: &Solid, floor: f64) -> Rect {
         let (a, b, radius) = solid.hull_rod();
         let drop = if floor.is_finite() { (a.z.max(b.z) + radius - floor).max(0.0) } else { 20.0 * radius };
@@ -63,7 +63,7 @@ impl Light {
         [[p[0].min(q[0]) - margin, p[1].min(q[1]) - margin], [p[0].max(q[0]) + margin, p[1].max(q[1]) + margin]]
     }
 
-    /// Share of the sun's disk that `solid` leaves visible from `p`.
+    /// Fraction of the sun's disk that `solid` leaves visible from `p`.
     pub fn visible(&self, solid: &Solid, p: DVec3) -> f64 {
         if let Shape::Sphere { .. } | Shape::Capsule { .. } = solid.shape {
             let (a, b, radius) = solid.hull_rod();
@@ -81,7 +81,8 @@ impl Light {
     }
 }
 
-/// Share of the sun's disk left visible by a capsule, from the angular distance between its edge and the disk's center.
+/// Fraction of the sun's disk left visible by a capsule, from the angular distance between its edge and the disk's
+/// center.
 fn rod_visibility(p: DVec3, sun: DVec3, a: DVec3, b: DVec3, radius: f64) -> f64 {
     // closest points of the half line p + t * sun and the segment a-b
     let (w, v) = (p - a, b - a);
@@ -95,6 +96,6 @@ fn rod_visibility(p: DVec3, sun: DVec3, a: DVec3, b: DVec3, radius: f64) -> f64 
     }
     let gap = (w + t * sun - s * v).length() - radius;
     let x = (0.5 + 0.5 * gap / (SUN_SIZE * t).max(1e-6)).clamp(0.0, 1.0);
-    // share of a disk on one side of a line, to within 2 percent
+    // fraction of a disk on one side of a line, with an error below 2 percent
     x * x * (3.0 - 2.0 * x)
 }

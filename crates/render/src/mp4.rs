@@ -1,4 +1,4 @@
-//! MP4 through an `ffmpeg` process that is fed raw pixels.
+//! MP4 files through an `ffmpeg` process that receives raw pixels.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -12,7 +12,7 @@ use crate::error::RenderError;
 use crate::image::{Image, same_size};
 
 const FPS: [f64; 2] = [0.1, 1000.0];
-/// H.264 encoders in order of preference; builds of ffmpeg differ in which they have. The last is in every build.
+/// H.264 encoders in order of preference. Builds of ffmpeg differ in their encoders; every build has the last one.
 const ENCODERS: [&[&str]; 4] = [
     &["libx264", "-crf", "18", "-preset", "medium"],
     &["libopenh264", "-b:v", "6M"],
@@ -45,7 +45,8 @@ impl Mp4Writer {
         Self::with_program(path, fps, "ffmpeg")
     }
 
-    /// The same with another program that takes ffmpeg's arguments, such as an absolute path to it.
+    /// Like [`create`](Self::create), with another program that takes ffmpeg's arguments, such as an absolute path to
+    /// it.
     ///
     /// # Errors
     /// As [`create`](Self::create).
@@ -55,7 +56,7 @@ impl Mp4Writer {
         if !(min..=max).contains(&fps) {
             return Err(RenderError::Fps { path: path.to_path_buf(), fps, min, max });
         }
-        // ask for the program before anything is rendered
+        // check that the program exists before anything is rendered
         encoders(path, program)?;
         let (pending, _) = Pending::create(path)?;
         Ok(Self { pending, program: program.into(), fps, running: None, count: 0, size: [0; 2] })
@@ -76,7 +77,7 @@ impl Mp4Writer {
         let sink = self.running.as_mut().and_then(|running| running.child.stdin.as_mut());
         match sink.map(|sink| sink.write_all(frame.rgb())) {
             Some(Ok(())) => Ok(()),
-            // a closed pipe means that ffmpeg gave up: its own words say why
+            // a closed pipe means that ffmpeg failed: its stderr has the reason
             Some(Err(error)) if error.kind() == std::io::ErrorKind::BrokenPipe => {
                 let words = self.wait()?;
                 Err(self.failed("it stopped reading frames".into(), words))
@@ -99,7 +100,7 @@ impl Mp4Writer {
         match whole {
             Ok(()) => self.pending.commit(),
             // on a full disk, ffmpeg may exit with success and report the error only on stderr
-            Err(problem) => Err(self.failed(format!("the film is not whole: {problem}"), words)),
+            Err(problem) => Err(self.failed(format!("the film is incomplete: {problem}"), words)),
         }
     }
 
@@ -116,7 +117,7 @@ impl Mp4Writer {
             .arg(format!("{width}x{height}"))
             .args(["-r", &self.fps.to_string(), "-i", "-", "-c:v"])
             .args(*encoder)
-            // players want 4:2:0, which wants even sides
+            // players need 4:2:0, which needs even sides
             .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"])
             .args(["-movflags", "+faststart", "-f", "mp4"])
             .arg(self.pending.temporary())
@@ -150,14 +151,14 @@ impl Mp4Writer {
 impl Drop for Mp4Writer {
     fn drop(&mut self) {
         if let Some(mut running) = self.running.take() {
-            // abandoned: nothing will want the rest of this film
+            // the film was abandoned
             let _ = running.child.kill();
             let _ = running.child.wait();
         }
     }
 }
 
-/// Names of the video encoders that the program has; fails when there is no such program.
+/// Names of the video encoders of the program. Fails if the program is missing.
 fn encoders(path: &Path, program: &str) -> Result<Vec<String>, RenderError> {
     let output = Command::new(program)
         .args(["-hide_banner", "-encoders"])

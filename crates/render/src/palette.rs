@@ -1,4 +1,4 @@
-//! Colors: sRGB constants, the way to linear light and back, and what a model without colors of its own wears.
+//! Colors: sRGB constants, conversion to linear light and back, and default colors of models.
 
 use glam::DVec3;
 
@@ -11,14 +11,14 @@ pub(crate) const NUMBER: u32 = 0xeef2f5;
 pub(crate) const FIFTH_LINE: u32 = 0xf5f7f8;
 pub(crate) const START_LINE: u32 = 0xf2b632;
 
-/// One base color per agent of a row; the first is the one seen when a single agent runs.
+/// One base color per agent of a row. A single agent has the first.
 const AGENTS: [u32; 6] = [0xe8792e, 0x2f86c1, 0x45a35c, 0xc94f7c, 0x8a63c7, 0xd0a52a];
-/// A figure that only shows where another should be.
+/// Color of a ghost, which shows a reference pose.
 pub(crate) const GHOST: u32 = 0xd8ecff;
-/// Things that belong to the world: steps, walls, ramps.
+/// Objects of the world: steps, walls, ramps.
 pub(crate) const WORLD: u32 = 0xb9b2a6;
 
-/// Side of the body a geom belongs to; the far limb is drawn darker so that a gait's two legs can be told apart.
+/// Side of the body that a geom belongs to. The far limb is drawn darker to distinguish the legs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Side {
     Middle,
@@ -48,7 +48,7 @@ pub(crate) fn sided(base: DVec3, side: Side) -> DVec3 {
     match side {
         Side::Middle => base,
         Side::Right => base * 0.86,
-        // left: darker and a little toward slate
+        // left: darker and slightly slate
         Side::Left => (base * 0.42).lerp(linear(0x3c4a63), 0.35),
     }
 }

@@ -1,4 +1,4 @@
-//! One way to write a film or a picture: the file's extension decides.
+//! A common writer for films and pictures. The file's extension selects the format.
 
 use std::path::{Path, PathBuf};
 
@@ -7,31 +7,31 @@ use crate::error::RenderError;
 use crate::image::{Image, strip};
 use crate::mp4::Mp4Writer;
 
-/// What a file name asks for.
+/// Format of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// A still picture or a strip.
     Png,
-    /// An animation that every browser and chat shows.
+    /// An animation for browsers and chats.
     Gif,
-    /// A film; needs `ffmpeg`.
+    /// A film. It needs `ffmpeg`.
     Mp4,
 }
 
 impl Format {
     const ALL: [(&'static str, Format); 3] = [("png", Format::Png), ("gif", Format::Gif), ("mp4", Format::Mp4)];
 
-    /// The format of a path by its extension, in either case.
+    /// The format of a path by its extension, in upper or lower case.
     ///
     /// # Errors
-    /// [`RenderError::Extension`], with the nearest valid one.
+    /// [`RenderError::Extension`], with the nearest valid extension.
     pub fn of(path: impl AsRef<Path>) -> Result<Self, RenderError> {
         let path = path.as_ref();
         let found = path.extension().map(|text| text.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
         if let Some((_, format)) = Self::ALL.iter().find(|(name, _)| *name == found) {
             return Ok(*format);
         }
-        // most letters in common; png, the first, when there are none
+        // the extension with the most letters in common; png, the first, without any
         let shared = |name: &str| name.chars().filter(|&c| found.contains(c)).count();
         let mut nearest = Self::ALL[0].0;
         for (name, _) in Self::ALL {
@@ -43,7 +43,7 @@ impl Format {
     }
 }
 
-/// Takes frames and writes a `.png` strip, a `.gif` or an `.mp4`.
+/// Writes frames to a `.png` strip, a `.gif` or an `.mp4`.
 pub struct Recorder {
     sink: Sink,
 }
@@ -55,7 +55,7 @@ enum Sink {
 }
 
 impl Recorder {
-    /// Opens a file. `fps` is for films; `columns` is how many frames of a `.png` strip share a row.
+    /// Creates a file. `fps` is for films; `columns` is the number of frames per row of a `.png` strip.
     ///
     /// # Errors
     /// [`RenderError::Extension`], [`RenderError::Fps`], [`RenderError::NoFfmpeg`], [`RenderError::Io`].
@@ -84,7 +84,7 @@ impl Recorder {
         }
     }
 
-    /// Completes the file; without this nothing is left of it.
+    /// Completes the file. Without this call, no file is left.
     ///
     /// # Errors
     /// [`RenderError::NoFrames`], [`RenderError::Io`] and the format's own.

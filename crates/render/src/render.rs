@@ -1,4 +1,4 @@
-//! The picture: one ray per pixel, more where something ends.
+//! Rendering: one ray per pixel, and more at edges.
 
 use std::sync::LazyLock;
 
@@ -11,7 +11,7 @@ use crate::palette::{Encoder, tone};
 use crate::scene::Frame;
 use crate::view::{FIRST_PLANE, SKY_ID, Sample, View};
 
-/// How edges are smoothed.
+/// Smoothing of edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Antialias {
     /// One ray per pixel.
@@ -69,7 +69,7 @@ impl Renderer {
             n => n,
         };
 
-        // first pass: one ray through the middle of each pixel, or all of them when that is asked for
+        // first pass: one ray through the middle of each pixel, or all rays of a grid
         let side = if let Antialias::Grid(side) = self.antialias { side.clamp(1, 8) } else { 1 };
         let nothing = Sample { color: DVec3::ZERO, id: SKY_ID, sun: 1.0 };
         let mut samples = vec![nothing; width * height];
@@ -95,7 +95,7 @@ impl Renderer {
     }
 }
 
-/// Mean of `side * side` rays in a pixel, tone-mapped one by one so that bright edges stay smooth.
+/// Mean of `side * side` rays in a pixel. Each ray is tone-mapped separately so that bright edges stay smooth.
 fn pixel(view: &View, x: usize, y: usize, side: usize) -> Sample {
     let share = 1.0 / side as f64;
     let mut mean = Sample { color: DVec3::ZERO, id: SKY_ID, sun: 1.0 };
@@ -108,7 +108,7 @@ fn pixel(view: &View, x: usize, y: usize, side: usize) -> Sample {
     mean
 }
 
-/// Whether a pixel differs from a neighbor in what it shows, in shade, or, on a solid, much in brightness.
+/// Whether a pixel differs from a neighbor in the visible object, in shadow, or, on a solid, much in brightness.
 fn is_edge(samples: &[Sample], size: [usize; 2], x: usize, y: usize) -> bool {
     let [width, height] = size;
     let here = &samples[y * width + x];
@@ -125,7 +125,7 @@ fn is_edge(samples: &[Sample], size: [usize; 2], x: usize, y: usize) -> bool {
         || (y + 1 < height && differs(x, y + 1))
 }
 
-/// Calls `work(row index, row)` for all rows of `data` on several threads, bands dealt out in turn.
+/// Calls `work(row index, row)` for all rows of `data` on several threads, which take bands in turn.
 fn in_bands<T: Send>(data: &mut [T], row: usize, threads: usize, work: impl Fn(usize, &mut [T]) + Sync) {
     let rows = data.len() / row;
     let threads = threads.clamp(1, rows.div_ceil(BAND));

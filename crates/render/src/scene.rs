@@ -1,4 +1,4 @@
-//! What is in the picture: a model's visible geoms, and frames of one or several agents posed from `qpos`.
+//! The contents of a picture: a model's visible geoms, and frames of one or several agents posed from `qpos`.
 
 use glam::{DMat3, DVec3};
 use marathon_physics::model::{Geom, GeomType, Model};
@@ -10,14 +10,14 @@ use crate::palette::{self, Side};
 use crate::shape::{Plane, Shape, Solid};
 use crate::terrain::Terrain;
 
-/// MuJoCo's default color, which says that nobody chose one.
+/// MuJoCo's default color, which means that the model sets none.
 const UNCHOSEN: [f32; 4] = [0.5, 0.5, 0.5, 1.0];
-/// Opacity of a ghost about its agent.
+/// Opacity of a ghost that overlaps its agent.
 const GHOST_ALPHA: f64 = 0.35;
-/// Geom groups from here on are hidden by MuJoCo's viewer unless asked for.
+/// First of the geom groups that MuJoCo's viewer hides by default.
 const FIRST_HIDDEN_GROUP: i32 = 3;
 
-/// A model ready to be drawn. Make it once, then one [`Frame`] per `qpos`.
+/// A model prepared for drawing. Create it once, then one [`Frame`] per `qpos`.
 #[derive(Clone, Debug)]
 pub struct Scene {
     model: Model,
@@ -25,27 +25,27 @@ pub struct Scene {
     planes: Vec<ShownPlane>,
     /// Geoms that are height fields.
     fields: Vec<usize>,
-    /// The runner's geoms all have the same color.
+    /// Whether the character's geoms all have the same color.
     one_color: bool,
     spacing: f64,
     radius: f64,
     height: f64,
     marks: Marks,
-    /// Ground of the agents' own, by agent and height field.
+    /// The agents' own ground, by agent and height field.
     grounds: Vec<Vec<Vec<f32>>>,
 }
 
-/// A geom that will be drawn, with what does not change between frames.
+/// A visible geom, with the data that does not change between frames.
 #[derive(Clone, Debug)]
 struct Shown {
     geom: usize,
     shape: Shape,
-    /// Own color in linear light; the palette's when `None`.
+    /// Own color in linear light, or `None` for the palette's.
     color: Option<DVec3>,
     alpha: f64,
     side: Side,
     moving: bool,
-    /// Part of the first joint's kinematic tree: the runner, not a prop.
+    /// Whether it is part of the first joint's kinematic tree: the character, not a prop.
     runner: bool,
 }
 
@@ -55,7 +55,7 @@ struct ShownPlane {
     half: [f64; 2],
 }
 
-/// One picture's worth of geometry in world coordinates.
+/// The geometry of one picture in world coordinates.
 #[derive(Clone, Debug)]
 pub struct Frame {
     pub(crate) solids: Vec<Solid>,
@@ -64,16 +64,16 @@ pub struct Frame {
     agents: Vec<AgentView>,
 }
 
-/// Where the ghosts of a frame are.
+/// Placement of the ghosts of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GhostPlace {
-    /// Where their `qpos` says: in and about the agents. They are translucent.
+    /// At their `qpos`, overlapping the agents. They are translucent.
     Inside,
     /// Each in the lane behind its agent.
     Beside,
 }
 
-/// Where an agent is in a frame, lateral offset included.
+/// Position of an agent in a frame, lateral offset included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AgentView {
     /// Position of its root body, m.
@@ -85,8 +85,8 @@ pub struct AgentView {
 impl Scene {
     /// Collects the visible geoms of `model`.
     ///
-    /// Left out are geoms with alpha 0, meshes (which the simulator refuses), and MuJoCo's hidden
-    /// groups 3 and up unless every geom of the moving bodies is in one of those.
+    /// It leaves out geoms with alpha 0, meshes (which the simulator refuses), and MuJoCo's hidden groups 3 and up,
+    /// unless every geom of the moving bodies is in one of those.
     pub fn new(model: &Model) -> Self {
         let moving = |geom: &Geom| model.bodies.get(geom.body).is_some_and(|body| body.weld_id != 0);
         let opaque = |geom: &Geom| geom.rgba[3] > 0.0;
@@ -116,7 +116,7 @@ impl Scene {
             }
         }
 
-        // sides are shaded apart only where the model's own colors do not tell them apart
+        // the sides have different shades only if the model's own colors do not distinguish them
         let sides: Vec<_> = shown.iter().map(|shown| (shown.side, shown.color)).collect();
         for shown in &mut shown {
             let twin = |side| sides.contains(&(side, shown.color));
@@ -148,17 +148,17 @@ impl Scene {
         }
     }
 
-    /// The same scene with agents of a row `spacing` meters apart along y; 0 overlays them in one place.
+    /// Sets the distance of agents in a row along y, m. 0 overlays them in one place.
     pub fn with_spacing(mut self, spacing: f64) -> Self {
         self.spacing = spacing;
         self
     }
 
-    /// Gives agents ground of their own from the next frame on: per agent, the elevations of each of the model's height fields,
-    /// by rows, m above the field's center. Those of whom nothing is said have the model's.
+    /// Sets the agents' own ground from the next frame on: per agent, the elevations of each of the model's height
+    /// fields, by rows, m above the field's center. Agents without elevations have the model's ground.
     ///
     /// # Panics
-    /// If there are not as many elevations as a field has points.
+    /// If the number of elevations differs from that of a field's points.
     pub fn set_grounds(&mut self, grounds: Vec<Vec<Vec<f32>>>) {
         for (own, field) in grounds.iter().flat_map(|own| own.iter().zip(&self.model.hfields)) {
             assert_eq!(own.len(), field.nrow * field.ncol, "one elevation per point of the grid");
@@ -166,13 +166,13 @@ impl Scene {
         self.grounds = grounds;
     }
 
-    /// The same scene with or without numbers and lines on the ground.
+    /// Shows or hides numbers and lines on the ground.
     pub fn with_marks(mut self, visible: bool) -> Self {
         self.marks.visible = visible;
         self
     }
 
-    /// The model that is drawn.
+    /// The model of the scene.
     pub fn model(&self) -> &Model {
         &self.model
     }
@@ -200,9 +200,9 @@ impl Scene {
         kinematics::pose(model, qpos, 0)
     }
 
-    /// Places one agent per `qpos` side by side: the first on y = 0, each next one farther from the default camera.
+    /// Places one agent per `qpos` side by side: the first on y = 0, each further one farther from the default camera.
     ///
-    /// Planes are drawn once; other geoms of the world are repeated in each agent's lane.
+    /// Planes are drawn once. Other static geoms are repeated in each agent's lane.
     ///
     /// # Errors
     /// [`RenderError::QposLength`] and [`RenderError::NotFinite`], with the agent's index.
@@ -210,8 +210,8 @@ impl Scene {
         self.frame_with_ghosts(qpos, &[], GhostPlace::Inside)
     }
 
-    /// As [`Scene::frame`], with a ghost of each agent: the same figure, pale and without a shadow, at another `qpos`. Ghosts
-    /// beside their agents take every second lane. A camera follows the agents alone.
+    /// Like [`Scene::frame`], with a ghost of each agent: the same character, pale and without a shadow, at another
+    /// `qpos`. Ghosts beside their agents take every second lane. Cameras only follow the agents.
     ///
     /// # Errors
     /// [`RenderError::QposLength`] and [`RenderError::NotFinite`], with the agent's index.
@@ -243,7 +243,7 @@ impl Scene {
             let elevations = own.and_then(|own| own.get(number)).map(Vec::as_slice);
             let colors = palette::CHECKER.map(palette::linear);
             let field = &self.model.hfields[number];
-            // strips beside each other do not overlap
+            // adjacent strips do not overlap
             let half_width =
                 if self.grounds.len() > 1 && self.spacing > 0.0 { 0.5 * self.spacing } else { f64::INFINITY };
             Terrain { field, elevations, pos: pos + offset, rot, half_width, colors }
@@ -272,7 +272,7 @@ impl Scene {
         for shown in self.shown.iter().filter(|shown| shown.moving || repeat_world) {
             let (pos, rot) = placed(pose, shown.geom);
             let color = match (shown.color, shown.moving) {
-                // one color all over tells the runners of a row apart no better than none
+                // a model with a single color gets the palette's colors to distinguish agents in a row
                 (Some(_), true) if self.one_color && agent > 0 => palette::agent(agent, shown.side),
                 (Some(own), true) => palette::sided(own, shown.side),
                 (Some(own), false) => own,
@@ -284,7 +284,7 @@ impl Scene {
         if agent == 0 {
             for plane in &self.planes {
                 let (pos, rot) = placed(pose, plane.geom);
-                // a floor is endless in the simulation, whatever size it declares for viewers
+                // a floor is infinite in the simulation, whatever its size for viewers
                 let level = rot.z_axis.z > 0.999;
                 let half = if level { [0.0; 2] } else { plane.half };
                 frame.planes.push(Plane { pos, rot, half });
@@ -301,7 +301,7 @@ impl Frame {
         &self.agents
     }
 
-    /// Adds a shape that no model has: a target, an arrow, an obstacle.
+    /// Adds a shape that is not part of a model: a target, an arrow, an obstacle.
     ///
     /// `mat` is its rotation, rows of three; `rgba` is sRGB, each in `0..=1`.
     pub fn add(&mut self, shape: Shape, pos: [f64; 3], mat: [[f64; 3]; 3], rgba: [f32; 4]) {
@@ -331,7 +331,7 @@ fn shape_of(geom: &Geom) -> Option<Shape> {
     }
 }
 
-/// Left or right by the geom's name, its bodies' names, or else where it is in the reference pose.
+/// Left or right by the geom's name, its bodies' names, or else its position in the reference pose.
 fn side_of(model: &Model, geom: &Geom, rest_y: Option<f64>) -> Side {
     let named = |name: &str| {
         let name = name.to_ascii_lowercase();
@@ -354,7 +354,7 @@ fn side_of(model: &Model, geom: &Geom, rest_y: Option<f64>) -> Side {
     })
 }
 
-/// Radius about the center of mass, height and half width of the runner in its reference pose.
+/// Radius about the center of mass, height and half width of the character in its reference pose.
 fn measure(shown: &[Shown], pose: &Pose) -> (f64, f64, f64) {
     let com = DVec3::from_array(pose.com);
     let (mut radius, mut half_width) = (0.0_f64, 0.0_f64);

@@ -1,4 +1,4 @@
-//! The color of a point: sun, sky, bounce from the floor, occlusion where things come close, a little gloss.
+//! The color of a point: sun, sky, bounce from the floor, occlusion by near objects, and some gloss.
 
 use glam::DVec3;
 
@@ -8,17 +8,17 @@ use crate::shape::Solid;
 use crate::view::{OCCLUSION_REACH, View};
 
 const SKY_POWER: f64 = 0.42;
-/// Distance at which half of a surface's color has given way to the haze, m per meter of ground cell.
+/// Distance at which the haze replaces half of a surface's color, m per meter of ground cell.
 const HAZE: f64 = 34.0;
 
-/// Lambert's cosine with its corner at the terminator rounded off.
+/// Lambert's cosine with a rounded corner at the terminator.
 fn soft_cosine(x: f64) -> f64 {
     const ROUND: f64 = 0.25;
     if x > ROUND { x } else { (x + ROUND).max(0.0) * (x + ROUND).max(0.0) / (4.0 * ROUND) }
 }
 
 impl View<'_> {
-    /// Share of the sun that reaches `p`; `own` is the solid that `p` lies on.
+    /// Fraction of the sun that reaches `p`. `own` is the solid that `p` lies on.
     fn sun_at(&self, p: DVec3, own: Option<usize>) -> f64 {
         let mut visible = 1.0_f64;
         for &index in self.shadow_candidates(p) {
@@ -26,14 +26,14 @@ impl View<'_> {
             let solid = &self.frame.solids[index];
             if Some(index) != own && !solid.ghost {
                 let open = self.light.visible(solid, p);
-                // parts of one body overlap: the darkest counts, a product would double the penumbra at joints
+                // parts of one body overlap: use the darkest, because a product would double the penumbra at joints
                 visible = visible.min(1.0 - solid.alpha * (1.0 - open));
             }
         }
         visible
     }
 
-    /// Share of the ambient light that reaches `p`, from balls at the nearest points of nearby rods.
+    /// Fraction of the ambient light that reaches `p`, from balls at the nearest points of nearby rods.
     fn ambient_at(&self, p: DVec3, normal: DVec3, own: Option<usize>) -> f64 {
         let mut open = 1.0;
         for &index in self.nearby(p) {
@@ -57,7 +57,7 @@ impl View<'_> {
         open
     }
 
-    /// Color of a plane at distance `t` along `d`, and the sun's share there.
+    /// Color of a plane at distance `t` along `d`, and the sun's fraction there.
     pub(crate) fn plane_color(&self, index: usize, t: f64, d: DVec3, ray: DVec3, pixel: f64) -> (DVec3, f32) {
         let plane = &self.frame.planes[index];
         let normal = plane.normal();
@@ -91,14 +91,14 @@ impl View<'_> {
         let Solid { color: albedo, ghost, .. } = self.frame.solids[index];
         let facing = normal.dot(light.sun);
         let lit = soft_cosine(facing);
-        // a ghost lies within the figure's own shade, which would blot it
+        // a ghost lies within the character's shadow, which would hide it
         let (sun, open) = match ghost {
             true => (1.0, 1.0),
             false if lit > 0.0 => (self.sun_at(p, Some(index)), self.ambient_at(p, normal, Some(index))),
             false => (0.0, self.ambient_at(p, normal, Some(index))),
         };
 
-        // close to the floor its light comes from the runner's own shade
+        // close to the floor, bounced light comes from the character's own shadow
         let height = self.frame.planes.iter().map(|plane| plane.normal().dot(p - plane.pos).max(0.0));
         let height = height.fold(f64::INFINITY, f64::min) / self.frame.marks.cell;
         let grounded = if height.is_finite() { (height / (height + 0.12)).min(1.0) } else { 1.0 };
@@ -106,7 +106,7 @@ impl View<'_> {
         let ambient = open * (1.0 - down * (1.0 - grounded)) * SKY_POWER * self.ambient_color(normal);
         let mut color = albedo * (sun * lit * light.sun_color + ambient);
 
-        // gloss of the sun, and the sky's rim that sets the figure off against the floor
+        // gloss of the sun, and a rim of sky light that separates the character from the floor
         let half = (light.sun - d).normalize();
         let gloss = normal.dot(half).max(0.0);
         let gloss = (0..5).fold(gloss, |power, _| power * power);

@@ -1,4 +1,4 @@
-//! The shapes that can be drawn and the closed forms of where a ray meets them.
+//! The drawable shapes, and closed forms of their intersections with a ray.
 
 use glam::{DMat3, DVec3};
 
@@ -36,7 +36,7 @@ pub enum Shape {
     },
 }
 
-/// Where a ray enters a shape.
+/// Intersection of a ray with the surface of a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Distance along the ray, m.
@@ -48,7 +48,8 @@ pub struct Hit {
 impl Shape {
     /// First entry of the ray `origin + t * direction`, `t > 0`, into the shape, all in the shape's frame.
     ///
-    /// `direction` must have unit length. A ray that starts inside meets nothing: surfaces are seen from outside only.
+    /// `direction` must have unit length. A ray that starts inside hits nothing, because surfaces are visible from
+    /// outside only.
     pub fn intersect(&self, origin: [f64; 3], direction: [f64; 3]) -> Option<Hit> {
         let (t, normal) = self.enter(DVec3::from_array(origin), DVec3::from_array(direction))?;
         Some(Hit { distance: t, normal: normal.to_array() })
@@ -65,7 +66,7 @@ impl Shape {
         }
     }
 
-    /// Radius of the smallest ball about the origin that holds the shape.
+    /// Radius of the smallest ball about the origin that contains the shape.
     pub(crate) fn bounding_radius(&self) -> f64 {
         match *self {
             Shape::Sphere { radius } => radius,
@@ -76,7 +77,7 @@ impl Shape {
         }
     }
 
-    /// A rod that holds the shape: axis, half length of the straight part, radius. Exact for spheres and capsules.
+    /// A rod that contains the shape: axis, half length of the straight part, radius. Exact for spheres and capsules.
     pub(crate) fn hull_rod(&self) -> (DVec3, f64, f64) {
         match *self {
             Shape::Sphere { radius } => (DVec3::Z, 0.0, radius),
@@ -120,7 +121,7 @@ fn longest(size: [f64; 3]) -> (DVec3, f64, [f64; 2]) {
 
 #[inline]
 fn sphere(o: DVec3, d: DVec3, radius: f64) -> Option<(f64, DVec3)> {
-    // the foot of the perpendicular keeps its digits far from the ball, where b*b - c would lose them
+    // the foot of the perpendicular stays accurate far from the ball, where b*b - c would not
     let b = o.dot(d);
     let foot = o - b * d;
     let disc = radius * radius - foot.length_squared();
@@ -135,7 +136,7 @@ fn sphere(o: DVec3, d: DVec3, radius: f64) -> Option<(f64, DVec3)> {
 fn capsule(o: DVec3, d: DVec3, radius: f64, half: f64) -> Option<(f64, DVec3)> {
     let a = d.x * d.x + d.y * d.y;
     if a < 1e-18 {
-        // along the axis: only the cap that faces the ray can be met
+        // along the axis: only the cap that faces the ray can be hit
         return cap(o, d, radius, -half * d.z.signum());
     }
     let b = o.x * d.x + o.y * d.y;
@@ -252,7 +253,7 @@ pub(crate) struct Solid {
     pub color: DVec3,
     /// Opacity, 0..=1.
     pub alpha: f64,
-    /// Part of a ghost: it casts no shadow, and a ray passes through one such surface at most.
+    /// Whether it is part of a ghost: ghosts cast no shadow, and a ray passes through at most one of their surfaces.
     pub ghost: bool,
 }
 
@@ -273,7 +274,7 @@ impl Solid {
         self.place(self.shape.hull_rod())
     }
 
-    /// Ends and radius of a rod like the solid.
+    /// Ends and radius of a rod of about the solid's volume.
     pub fn soft_rod(&self) -> (DVec3, DVec3, f64) {
         self.place(self.shape.soft_rod())
     }

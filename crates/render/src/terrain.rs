@@ -1,4 +1,4 @@
-//! Height fields: slabs, one per piece of ground that is level or slopes evenly.
+//! Height fields as slabs, one per piece of ground that is level or slopes evenly.
 
 use std::ops::Range;
 
@@ -7,31 +7,31 @@ use marathon_physics::model::HField;
 
 use crate::shape::{Shape, Solid};
 
-/// Thickness of a slab, m: more than the highest step between neighbors would show through.
+/// Thickness of a slab, m. Larger steps between neighbors would show gaps.
 const THICKNESS: f64 = 0.3;
-/// Farthest from an agent along x that ground is drawn, m: beyond it is haze.
+/// Largest distance from an agent along x at which ground is drawn, m. Beyond it is haze.
 const REACH: f64 = 24.0;
-/// Stripes across the way show how fast a runner is: meters of each.
+/// Width of the stripes across the ground, m. They show the speed of a character.
 const STRIPE: f64 = 1.0;
-/// Elevations that differ by less are one, m.
+/// Elevations that differ by less count as equal, m.
 const SAME: f64 = 1e-6;
 
-/// A height field in its place.
+/// A height field with its pose.
 pub(crate) struct Terrain<'a> {
     pub field: &'a HField,
-    /// Elevations by rows, m above its center; the model's own if there are none.
+    /// Elevations by rows, m above its center. `None` for the model's own.
     pub elevations: Option<&'a [f32]>,
     pub pos: DVec3,
     /// Columns are its axes in the world.
     pub rot: DMat3,
-    /// Cells that are farther from its middle along y are not drawn, m.
+    /// Cells farther from the middle along y are not drawn, m.
     pub half_width: f64,
     /// Light and dark stripes.
     pub colors: [DVec3; 2],
 }
 
 impl Terrain<'_> {
-    /// Appends what is near `x` in the world.
+    /// Appends the slabs near `x` in the world.
     pub fn add_to(&self, solids: &mut Vec<Solid>, x: f64) {
         for row in 0..self.field.nrow.saturating_sub(1) {
             if self.point(row, 0).y >= self.half_width || self.point(row + 1, 0).y <= -self.half_width {
@@ -71,20 +71,20 @@ impl Terrain<'_> {
         DVec3::new(col as f64 * dx - half_x, y, z)
     }
 
-    /// Rises of a cell along x at its lower and upper edge, and along y at its left one.
+    /// Height differences of a cell along x at its lower and upper edge, and along y at its left edge.
     fn rises(&self, row: usize, col: usize) -> [f64; 3] {
         let z = |i: usize, j: usize| self.point(row + i, col + j).z;
         [z(0, 1) - z(0, 0), z(1, 1) - z(1, 0), z(1, 0) - z(0, 0)]
     }
 
-    /// Whether a slab that begins with one cell of a row goes on with another, in the same stripe.
+    /// Whether a slab that starts with one cell of a row can include another cell, in the same stripe.
     fn goes_on(&self, row: usize, from: usize, next: usize) -> bool {
         let stripe = |col: usize| ((self.pos.x + self.point(row, col).x + SAME) / STRIPE).floor();
         let same = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < SAME);
         stripe(from) == stripe(next) && same(self.rises(row, from), self.rises(row, next))
     }
 
-    /// The slab under some cells of a row, whose upper face goes through their corners if these lie in a plane.
+    /// The slab under some cells of a row. Its upper face goes through their corners if these lie in a plane.
     fn slab(&self, row: usize, cols: Range<usize>) -> Solid {
         let corner = |i: usize, col: usize| self.point(row + i, col);
         let (a, b, c, d) = (corner(0, cols.start), corner(0, cols.end), corner(1, cols.start), corner(1, cols.end));
@@ -118,7 +118,7 @@ mod tests {
         out
     }
 
-    /// Height at which a ray from above meets the slabs.
+    /// Height at which a ray from above hits the slabs.
     fn height(slabs: &[Solid], x: f64, y: f64) -> f64 {
         let hits = slabs.iter().filter_map(|slab| slab.enter(DVec3::new(x, y, 10.0), -DVec3::Z));
         10.0 - hits.map(|(t, _)| t).fold(f64::INFINITY, f64::min)

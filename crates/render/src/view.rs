@@ -1,4 +1,4 @@
-//! A frame prepared for one camera: what each tile of the picture, each light ray and each spot may meet.
+//! A frame prepared for one camera: the candidate solids of each tile of the picture, each light ray and each spot.
 
 use glam::DVec3;
 
@@ -13,10 +13,10 @@ use crate::shape::Solid;
 const TILE: usize = 16;
 /// Reach of ambient occlusion in radii of the occluding rod.
 pub(crate) const OCCLUSION_REACH: f64 = 4.0;
-/// A translucent surface lets the ray go on, this many times at most.
+/// Maximum number of translucent surfaces along a ray.
 const LAYERS: usize = 6;
 
-/// A solid's likeness for soft effects.
+/// A simplified solid for soft effects.
 #[derive(Clone, Copy)]
 pub(crate) struct Rod {
     pub a: DVec3,
@@ -36,13 +36,13 @@ pub(crate) struct View<'a> {
     nearby: Bins,
 }
 
-/// What a ray found, before tone mapping.
+/// Result of a ray, before tone mapping.
 #[derive(Clone, Copy)]
 pub(crate) struct Sample {
     pub color: DVec3,
-    /// Solid index plus a base; planes and the sky have small numbers.
+    /// Index of a solid plus a base. Planes and the sky have small numbers.
     pub id: u32,
-    /// Share of the sun that reaches a plane; 1 elsewhere.
+    /// Fraction of the sun that reaches a plane; 1 elsewhere.
     pub sun: f32,
 }
 
@@ -99,7 +99,7 @@ impl<'a> View<'a> {
         self.shadows.at(u, v)
     }
 
-    /// Solids near enough to a point to darken its ambient light.
+    /// Solids close enough to a point to darken its ambient light.
     #[inline]
     pub fn nearby(&self, p: DVec3) -> &[u32] {
         self.nearby.at(p.x, p.y)
@@ -110,8 +110,8 @@ impl<'a> View<'a> {
         FIRST_PLANE + self.frame.planes.len() as u32
     }
 
-    /// The light along the ray through picture coordinates `(x, y)`, for a sample that stands for a square of `share`
-    /// pixels' side.
+    /// The light along the ray through picture coordinates `(x, y)`, for a sample that represents a square with sides
+    /// of `share` pixels.
     pub fn sample(&self, x: f64, y: f64, share: f64) -> Sample {
         let basis = &self.basis;
         let pixel = 2.0 * basis.slope / self.size[1] as f64;
@@ -152,7 +152,7 @@ impl<'a> View<'a> {
         sample
     }
 
-    /// Nearest surface beyond `start`, of ghosts only if none of them has been met.
+    /// Nearest surface beyond `start`. Ghosts count only if none has been hit yet.
     #[inline]
     fn nearest(&self, o: DVec3, d: DVec3, start: f64, candidates: &[u32], haunted: bool) -> Option<(f64, Surface)> {
         let mut best: Option<(f64, Surface)> = None;
@@ -185,7 +185,7 @@ enum Surface {
 fn screen_rect(solid: &Solid, basis: &Basis, size: [usize; 2]) -> Rect {
     let everywhere = [[0.0; 2], size.map(|side| side as f64)];
     let (a, b, radius) = solid.hull_rod();
-    // flat ends reach beyond the rod's straight part only sideways, so two balls and their hull hold the solid
+    // flat ends only extend beyond the rod's straight part sideways, so two balls and their hull contain the solid
     let mut rect = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
     let scale = 0.5 * size[1] as f64 / basis.slope;
     for end in [a, b] {

@@ -13,12 +13,12 @@ pub struct Args {
     /// Print one JSON object on stdout and nothing else there.
     #[arg(long, global = true)]
     pub json: bool,
-    /// What to do.
+    /// Command.
     #[command(subcommand)]
     pub command: Command,
 }
 
-/// What to do.
+/// Command.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     #[command(flatten)]
@@ -65,13 +65,13 @@ pub enum Study {
         /// Clips of Marathon Man, or other tasks such as HumanoidStyleRun, separated by commas [default: all].
         #[arg(long, value_name = "CLIPS", value_delimiter = ',')]
         clips: Vec<String>,
-        /// Write the page of the kept runs and train nothing.
+        /// Write the page from the kept runs without training.
         #[arg(long)]
         kept_only: bool,
     },
-    /// Runners that learned on flat, random, ever harder and adversarial ground, with and without seeing it, on courses that
-    /// are new to all of them. Runs are kept in runs/assault-course or --keep, each with a small file of its results; these
-    /// files are enough to write the page again.
+    /// Characters that learned on flat, random, increasingly difficult and adversarial ground, with and without seeing
+    /// it, on courses that are new to all of them. Runs are kept in runs/assault-course or --keep, each with a small
+    /// file of its results; these files are enough to write the page again.
     AssaultCourse {
         #[command(flatten)]
         options: Options,
@@ -82,10 +82,10 @@ pub enum Study {
         /// regret [default: all].
         #[arg(long, value_name = "GROUNDS", value_delimiter = ',')]
         grounds: Vec<String>,
-        /// Whether runners see the ground: heights, blind, or both separated by a comma [default: both].
+        /// Whether characters see the ground: heights, blind, or both separated by a comma [default: both].
         #[arg(long, value_name = "SIGHTS", value_delimiter = ',')]
         sights: Vec<String>,
-        /// Write the page of the kept runs and train nothing.
+        /// Write the page from the kept runs without training.
         #[arg(long)]
         kept_only: bool,
     },
@@ -119,8 +119,8 @@ pub struct Options {
     /// Folder for the three files.
     #[arg(long, value_name = "DIR", default_value = "docs/studies")]
     pub out: PathBuf,
-    /// Folder that keeps runs: those of other trainers, and all runs of style-transfer and assault-course. A kept run is not
-    /// made again, so that an interrupted study continues.
+    /// Folder that keeps runs: those of other trainers, and all runs of style-transfer and assault-course. Kept runs
+    /// are reused, so that an interrupted study continues.
     #[arg(long, value_name = "DIR")]
     pub keep: Option<PathBuf>,
 }

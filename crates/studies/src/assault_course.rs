@@ -1,5 +1,5 @@
-//! Assault courses: figures learn on level, random, ever harder and adversarial ground, with and without seeing it. Their
-//! policies are evaluated on courses that are new to all of them.
+//! Assault courses: characters learn on level, random, increasingly difficult and adversarial ground, with and without
+//! seeing it. Their policies are evaluated on courses that are new to all of them.
 
 use crate::args::Options;
 use crate::error::StudyError;
@@ -21,16 +21,16 @@ use std::path::{Path, PathBuf};
 
 /// Default folder of the kept runs.
 const KEEP: &str = "runs/assault-course";
-/// The figures.
+/// The characters.
 const TASKS: [&str; 2] = ["TerrainHopper", "TerrainWalker2d"];
 
-/// Runners that see the ground, and runners that do not.
+/// Characters that see the ground, and characters that do not.
 const SIGHTS: [&str; 2] = ["heights", "blind"];
 
-/// Ground to learn on: its name and its arguments.
+/// Training ground: its name and its options.
 type Ground = (&'static str, &'static [(&'static str, &'static str)]);
 
-/// Grounds to learn on.
+/// Training grounds.
 const GROUNDS: [Ground; 7] = [
     ("flat", &[("course", "flat"), ("levels", "fixed")]),
     ("random", &[("course", "mixed"), ("levels", "random"), ("difficulty", "1")]),
@@ -41,7 +41,7 @@ const GROUNDS: [Ground; 7] = [
     ("regret", &[("course", "adversary"), ("levels", "fixed"), ("difficulty", "1"), REGRET]),
 ];
 
-/// The reward of the builder. With it, two runners take turns, so a run has twice the decisions.
+/// The reward of the builder. With it, two characters take turns, so a run has twice the decisions.
 const REGRET: (&str, &str) = ("builder", "regret");
 
 /// Courses of the evaluation: name in the table, kind, difficulty.
@@ -53,9 +53,9 @@ const COURSES: [(&str, &str, &str); 5] = [
     ("meters", "meters", "0.5"),
 ];
 
-/// Ground that a runner's own adversary may build.
+/// Ground that a character's own adversary may build.
 const ADVERSARY: [(&str, &str); 3] = [("course", "adversary"), ("levels", "fixed"), ("difficulty", "0.5")];
-/// Decisions of the runner for which its own adversary learns.
+/// Decisions of the character for which its own adversary learns.
 const ADVERSARY_STEPS: u64 = 4_000_000;
 
 /// Results of a finished run.
@@ -70,7 +70,8 @@ struct Found {
     cpu_seconds: f64,
     /// The evaluation on each course.
     courses: Vec<Judged>,
-    /// The evaluation on the ground of its own adversary, which learned against the fixed policy; older files have none.
+    /// The evaluation on the ground of its own adversary, which learned against the fixed policy. Older files have
+    /// none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     adversary: Option<Judged>,
 }
@@ -81,7 +82,7 @@ struct Found {
 struct Judged {
     course: String,
     difficulty: f64,
-    /// Mean distance of an episode, m.
+    /// Mean distance per episode, m.
     distance: f64,
     /// Episodes that ended with a fall.
     falls: u64,
@@ -94,17 +95,17 @@ impl Judged {
     }
 }
 
-/// Trains and evaluates. `only` names tasks, grounds and sights; an empty list means all. With `kept_only`, uses the kept runs
-/// and trains nothing.
+/// Trains and evaluates. `only` names tasks, grounds and sights; an empty list means all. With `kept_only`, uses the
+/// kept runs without training.
 ///
 /// # Errors
-/// If a name is unknown, or a run cannot be trained or read, or was made with another configuration.
+/// If a name is unknown, or a run cannot be trained or read, or has another configuration.
 pub fn run(options: &Options, only: [&[String]; 3], kept_only: bool) -> Result<Record, StudyError> {
     let [tasks, grounds, sights] = only;
     let tasks = chosen("--tasks", tasks, &TASKS)?;
     let grounds = chosen("--grounds", grounds, &GROUNDS.map(|(name, _)| name))?;
     let sights = chosen("--sights", sights, &SIGHTS)?;
-    interrupt::install("finishing this iteration; the same command goes on from there")?;
+    interrupt::install("finishing this iteration; the same command continues")?;
     let keep = options.keep.clone().unwrap_or_else(|| PathBuf::from(KEEP));
     let (mut rows, mut bars) = (Vec::new(), Vec::new());
     for task in &tasks {
@@ -181,7 +182,7 @@ fn chosen(flag: &str, asked: &[String], all: &[&'static str]) -> Result<Vec<&'st
     Ok(all.iter().copied().filter(|name| asked.is_empty() || asked.iter().any(|a| a == name)).collect())
 }
 
-/// Results of a run; none if it is not kept and `kept_only` forbids training.
+/// Results of a run. `None` if it is not kept and `kept_only` forbids training.
 fn one(
     task: &str,
     ground: &[(&str, &str)],
@@ -224,7 +225,7 @@ fn one(
     Ok(Some(found))
 }
 
-/// Arguments of a task, from names and values.
+/// Options of a task, from names and values.
 fn arguments(list: &[(&str, &str)]) -> TaskOptions {
     let read = |text: &str| text.parse().unwrap_or_else(|never| match never {});
     TaskOptions { given: list.iter().map(|(name, value)| ((*name).into(), read(value))).collect() }

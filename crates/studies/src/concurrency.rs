@@ -11,7 +11,7 @@ use marathon_runs::report::chart::Chart;
 
 const AGENT: &str = "Hopper-v0";
 const AGENTS: [usize; 4] = [16, 64, 512, 4096];
-/// Decisions of all agents in a rollout; more if [`SHORTEST`] asks for it.
+/// Decisions of all agents per rollout, unless [`SHORTEST`] requires more.
 const ROLLOUT: usize = 8192;
 /// Fewest decisions of each agent per rollout; advantages need that many.
 const SHORTEST: usize = 16;

@@ -83,7 +83,7 @@ pub fn run(options: &Options) -> Result<Record, StudyError> {
             plus_minus(spread(runs.iter().map(|r| r.eval.speed_mean)), 2),
             plus_minus(spread(runs.iter().map(seconds)), 1),
         ]);
-        // in units of the own period's decisions, or periods could not be compared
+        // in units of the own period's decisions, so that periods can be compared
         let part = frame_skip as f64 / own as f64;
         let line = mean_curve(&runs, config.run.total_steps).into_iter().map(|(x, y)| (x * part, y * part)).collect();
         lines.push((format!("every {frame_skip}: {name}"), line));

@@ -22,13 +22,13 @@ pub enum StudyError {
     /// The command line is wrong.
     #[error("{0}")]
     Usage(String),
-    /// The user pressed Ctrl-C; the text says what is saved and how to continue.
+    /// The user pressed Ctrl-C. The text says what is saved and how to continue.
     #[error("interrupted: {0}")]
     Interrupted(String),
 }
 
 impl StudyError {
-    /// For `map_err` after an operation on a file.
+    /// Converts an I/O error of an operation on a file, for `map_err`.
     pub fn io(path: &Path, action: &'static str) -> impl FnOnce(std::io::Error) -> Self {
         move |source| RunError::io(path, action)(source).into()
     }

@@ -1,5 +1,5 @@
-//! Kept runs of long studies. An interrupted study continues with them. A small file beside each run's folder has its results,
-//! which are enough for the study's page.
+//! Kept runs of long studies. An interrupted study continues with them. A small file next to each run's folder has its
+//! results, which are enough for the study's page.
 
 use crate::args::Options;
 use crate::error::StudyError;
@@ -17,12 +17,12 @@ use std::path::{Path, PathBuf};
 pub struct Job {
     /// Registry name of the task.
     pub task: String,
-    /// Arguments of the task.
+    /// Options of the task.
     pub arguments: TaskOptions,
     pub seed: u64,
     /// Its configuration; `--steps` of the study overrides the steps of the configuration.
     pub loaded: Loaded,
-    /// The policy that training starts from; without one, weights are random.
+    /// The policy that training starts from; `None` for random weights.
     pub initialize_from: Option<PathBuf>,
 }
 
@@ -39,10 +39,10 @@ impl Job {
         RunOptions { learn, task, initialize_from, ..RunOptions::default() }
     }
 
-    /// The run that a new training would make.
+    /// The run that a new training would create.
     ///
     /// # Errors
-    /// If there is no such task, or it does not take the arguments.
+    /// If there is no such task, or it does not take the options.
     pub fn expected(&self, options: &Options) -> Result<RunFile, StudyError> {
         let new = self.new_run(options);
         Ok(Session::open(Some(Task::named(&self.task)?), &new, Some(self.loaded.clone()), true)?.0.run)
@@ -70,12 +70,12 @@ impl Job {
         let outcome = session.carry_out(true, &mut { stop })?;
         match outcome.evaluation {
             Some(_) => Ok(()),
-            None => Err(StudyError::Interrupted("what is done is kept; the same command goes on from there".into())),
+            None => Err(StudyError::Interrupted("finished work is kept; the same command continues".into())),
         }
     }
 }
 
-/// The file with the results of a run, beside its folder.
+/// The file with the results of a run, next to its folder.
 pub fn file(folder: &Path) -> PathBuf {
     let mut name = folder.file_name().unwrap_or_default().to_os_string();
     name.push(".json");
@@ -92,7 +92,7 @@ pub fn summary(folder: &RunFolder) -> Result<Summary, StudyError> {
     serde_json::from_str(&text).map_err(|error| StudyError::file(&file, "summary", error, "that of a run"))
 }
 
-/// Kept results; none if there is no file.
+/// Kept results. `None` if there is no file.
 ///
 /// # Errors
 /// If the file cannot be read.

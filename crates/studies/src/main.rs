@@ -46,7 +46,7 @@ fn run(args: &Args) -> Result<(), StudyError> {
     let study = match &args.command {
         Command::Study(study) => study,
         Command::RolloutWorker => {
-            // Ctrl-C is for the learner, which finishes its iteration
+            // the learner handles Ctrl-C and finishes its iteration
             interrupt::listen(|| {})?;
             return Ok(processes::serve()?);
         }

@@ -78,7 +78,8 @@ struct Kept {
     versions: String,
 }
 
-/// Returns the training of `job` from the folder `keep`, or makes it, which takes minutes, and keeps it there.
+/// Returns the training of `job` from the folder `keep`. Otherwise trains, which takes minutes, and keeps the result
+/// there.
 fn once(
     keep: Option<&Path>,
     (name, seed): (&str, u64),
@@ -105,8 +106,8 @@ fn once(
     Ok((kept.run, kept.versions))
 }
 
-/// Trains sixteen agents with Stable-Baselines3 on a device of PyTorch (`cpu`, `cuda`). The standard deviation of actions
-/// starts at `exp(log_std)`. A training in `keep` is not made again. Returns the run and the versions of the packages.
+/// Trains sixteen agents with Stable-Baselines3 on a device of PyTorch (`cpu`, `cuda`). The standard deviation of
+/// actions starts at `exp(log_std)`. A training in `keep` is reused. Returns the run and the versions of the packages.
 ///
 /// # Errors
 /// If the packages are missing, or training fails.
@@ -135,8 +136,9 @@ pub fn sb3(
     })
 }
 
-/// Trains with `mlagents-learn` and `marathon-player`, with the settings of a PPO configuration from a file of ML-Agents, and
-/// evaluates the policy in Marathon. A training in `keep` is not made again. Returns the run and the versions of the packages.
+/// Trains with `mlagents-learn` and `marathon-player`, with the settings of a PPO configuration from a file of
+/// ML-Agents, and evaluates the policy in Marathon. A training in `keep` is reused. Returns the run and the versions of
+/// the packages.
 ///
 /// # Errors
 /// If ML-Agents or the player is missing, or training fails.
@@ -216,7 +218,7 @@ fn file(behavior: &str, config: &TrainConfig, time_horizon: u64) -> Value {
     }}})
 }
 
-/// `marathon-player`, which is built beside this program.
+/// `marathon-player`, which is built next to this program.
 fn player() -> Result<PathBuf, StudyError> {
     let name = if cfg!(windows) { "marathon-player.exe" } else { "marathon-player" };
     let own = std::env::current_exe().map_err(StudyError::io(Path::new("marathon-studies"), "find"))?;
@@ -256,7 +258,7 @@ fn ask(python: &Path, variable: &str, advice: &str, job: &Value) -> Result<Value
 
 /// Reads the answer of a trainer.
 fn trained(answer: Value) -> Result<Answer, StudyError> {
-    serde_json::from_value(answer).map_err(|e| StudyError::Python(format!("an answer of Python's makes no sense: {e}")))
+    serde_json::from_value(answer).map_err(|e| StudyError::Python(format!("invalid answer of Python: {e}")))
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ pub fn plus_minus((mean, deviation): (f64, f64), decimals: usize) -> String {
     format!("{mean:.decimals$} ± {deviation:.decimals$}")
 }
 
-/// The median, the mean of the two middle numbers if their count is even; none without numbers.
+/// The median: the mean of the two middle numbers if their count is even. `None` without numbers.
 pub fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let (low, high) = (values.len().checked_sub(1)? / 2, values.len() / 2);

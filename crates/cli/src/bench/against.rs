@@ -1,4 +1,4 @@
-//! `--against mujoco`: both engines on the same workload, in turns, so that other load on the computer slows both.
+//! `--against mujoco`: both engines alternate on the same workload, so that other load on the computer affects both.
 
 use super::mujoco::{Mujoco, Turn};
 use super::options::Head;
@@ -11,10 +11,10 @@ use marathon_runs::terminal::{note, print_json, say};
 use marathon_runs::text::broken;
 use serde::Serialize;
 
-/// Turns of each engine.
+/// Number of turns of each engine.
 const ROUNDS: usize = 5;
 
-/// A model on an instruction set, and MuJoCo beside it. Times are medians over the rounds.
+/// A model on an instruction set, compared with MuJoCo. Times are medians over the rounds.
 #[derive(Serialize)]
 struct Row {
     agent: String,
@@ -41,7 +41,7 @@ struct Side {
     spread: f64,
     /// Mean number of contacts of an agent.
     contacts: f64,
-    /// Agents whose simulation broke down.
+    /// Agents whose simulation became non-finite.
     broken: u64,
 }
 
@@ -92,7 +92,7 @@ pub fn run(plan: &Plan, subjects: &[Subject], head: Head, json: bool) -> Result<
         });
     }
     for (i, row) in rows.iter().enumerate() {
-        // a model's rows share MuJoCo's side
+        // the rows of a model share MuJoCo's result
         if i.is_multiple_of(plan.isas.len()) {
             note_broken(&row.mujoco, &row.agent, "MuJoCo");
         }

@@ -1,4 +1,4 @@
-//! How well policies follow commands.
+//! `bench controller`: how well policies track commands.
 
 use super::options::Head;
 use crate::error::CliError;
@@ -36,10 +36,10 @@ struct Document<'a> {
     obedience: &'a Obedience,
 }
 
-/// Plays the trials.
+/// Runs the trials.
 ///
 /// # Errors
-/// If there is no such policy, its task takes no speed command, or the picture cannot be written.
+/// If there is no such policy, its task has no speed command, or the picture cannot be written.
 pub fn run(args: &ControllerArgs, json: bool) -> Result<(), CliError> {
     if let Some(out) = &args.out {
         output::check(out, &["png"], &[&args.source.policy])?;

@@ -1,4 +1,4 @@
-//! The environments under random actions, resets included.
+//! `bench env`: the environments under random actions, including resets.
 
 use super::options::{Common, Head, isas, seconds, supported};
 use super::row::{Figures, Row, Table};
@@ -29,9 +29,9 @@ pub struct EnvArgs {
 struct Env {
     /// Physics steps per decision.
     frame_skip: usize,
-    /// Mean decisions of an episode; none if no episode ended.
+    /// Mean decisions per episode. `None` if no episode ended.
     episode_length: Option<f64>,
-    /// Agents whose simulation broke down.
+    /// Agents whose simulation became non-finite.
     diverged: u64,
 }
 

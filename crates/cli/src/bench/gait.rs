@@ -60,7 +60,7 @@ struct Run {
     steps: u64,
     cpu_seconds: f64,
     wall_seconds: f64,
-    /// Agents whose simulation broke down.
+    /// Agents whose simulation became non-finite.
     diverged: u64,
     /// The last evaluation.
     eval: Option<Evaluation>,

@@ -1,5 +1,5 @@
-//! `marathon bench`: speed of the physics, the environments and the training on this computer, and how well a policy follows
-//! commands.
+//! `marathon bench`: speed of the physics, the environments and the training on this computer, and how well a policy
+//! tracks commands.
 //!
 //! Times are processor time, so other programs on the computer hardly change them. A step is a step of one agent. A row is
 //! the median of several repetitions; `spread` compares its slowest repetition with its fastest.
@@ -36,7 +36,7 @@ pub struct BenchArgs {
 /// What to measure.
 #[derive(Debug, Subcommand)]
 pub enum What {
-    /// The physics alone, under random torques or the recorded controls of a policy. A step is a physics step.
+    /// The physics only, under random torques or the recorded controls of a policy. A step is a physics step.
     Physics(physics::PhysicsArgs),
     /// The environments: random actions, physics, observations, rewards, resets. A step is a decision.
     Env(env::EnvArgs),
@@ -44,7 +44,7 @@ pub enum What {
     Train(train::TrainArgs),
     /// Processor seconds of training until the agent runs at --speed with at most --falls falls, for each seed.
     Gait(gait::GaitArgs),
-    /// How well a policy follows commands: a minute of random commands, speed steps, turns, standing, jumps, pushes.
+    /// How well a policy tracks commands: a minute of random commands, speed steps, turns, standing, jumps, pushes.
     Controller(controller::ControllerArgs),
 }
 

@@ -36,12 +36,12 @@ pub struct Turn {
     wall: f64,
     /// Mean number of contacts of an agent.
     pub contacts: f64,
-    /// Agents whose simulation broke down.
+    /// Agents whose simulation became non-finite.
     pub broken: u64,
 }
 
 impl Turn {
-    /// Its times.
+    /// Its times as a sample.
     pub fn sample(&self) -> Sample {
         Sample { steps: self.steps, cpu: self.cpu, wall: self.wall }
     }

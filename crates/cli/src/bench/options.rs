@@ -1,4 +1,4 @@
-//! Options of all benchmarks, and the facts of the computer.
+//! Options of all benchmarks, and properties of the computer.
 
 use crate::error::CliError;
 use marathon_envs::registry;
@@ -44,7 +44,7 @@ impl Common {
     }
 }
 
-/// The computer.
+/// Properties of the computer.
 #[derive(Serialize)]
 pub struct Machine {
     pub arch: &'static str,

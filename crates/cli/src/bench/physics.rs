@@ -1,4 +1,4 @@
-//! The physics alone.
+//! `bench physics`: the physics only.
 
 use super::against;
 use super::options::{Common, Head, isas, seconds, supported};

@@ -7,13 +7,13 @@ use marathon_runs::terminal::{note, print_json, say};
 use marathon_runs::text::short;
 use serde::Serialize;
 
-/// Figures that only one benchmark has.
+/// Columns that only one benchmark has.
 pub trait Figures: Serialize {
     /// Names of their columns.
     const HEADER: &'static str;
     /// The columns.
     fn cells(&self) -> String;
-    /// Agents whose simulation broke down.
+    /// Agents whose simulation became non-finite.
     fn broken(&self) -> u64;
 }
 
@@ -40,7 +40,7 @@ pub struct Row<F> {
 }
 
 impl<F: Figures> Row<F> {
-    /// A row from at least one repetition; `size` is the number of threads and of agents.
+    /// Creates a row from at least one repetition. `size` is the number of threads and of agents.
     pub fn new(agent: &str, isa: Isa, size: (usize, usize), samples: &[Sample], figures: F) -> Self {
         let (threads, agents) = size;
         let median = median(samples);

@@ -1,4 +1,4 @@
-//! Recorded states and controls of a policy's agents, replayed by the physics alone: `bench physics --policy`.
+//! Recorded states and controls of a policy's agents, replayed by the physics only: `bench physics --policy`.
 
 use super::plan::{Counts, Plan, Which};
 use crate::error::CliError;
@@ -11,7 +11,7 @@ use marathon_runs::speed::{Sample, on_threads, thread_cpu};
 use serde::Serialize;
 use std::time::Instant;
 
-/// Scenes of a policy; each has all agents.
+/// Scenes per policy. Each has all agents.
 const SCENES: usize = 6;
 /// Decisions of a scene. Scenes are short: a character falls soon when controls do not react to its state.
 const DECISIONS: usize = 20;

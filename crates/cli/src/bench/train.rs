@@ -50,7 +50,7 @@ struct Train {
     /// Share of the time in gradient updates.
     update_share: f64,
     physics_steps_per_wall_second: f64,
-    /// Agents whose simulation broke down.
+    /// Agents whose simulation became non-finite.
     diverged: u64,
 }
 
@@ -72,7 +72,7 @@ impl Figures for Train {
 pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
     let (agents, threads) = (args.common.agents(false)?, args.common.threads());
     let isas = if args.isa.is_empty() { vec![Isa::best()] } else { args.isa.clone() };
-    let step = "one decision of one agent, with all that learning from it takes";
+    let step = "one decision of one agent, learning included";
     let mut table = Table::new(json, Head::new("train", threads), args.seconds, step);
     for id in &agents {
         for isa in &isas {

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// Averages policies and writes the mean.
 ///
 /// # Errors
-/// If a file is no policy, the policies do not fit each other, or the mean cannot be written.
+/// If a file is not a policy, the policies do not match, or the mean cannot be written.
 pub fn run(args: &AverageArgs, json: bool) -> Result<(), CliError> {
     output::check(&args.out, &policy_file::ENDINGS, &args.policies)?;
     let (policy, paths) = average(&args.policies, &args.task)?;

@@ -28,7 +28,7 @@ pub fn export(args: &ExportArgs, json: bool) -> Result<(), CliError> {
 /// Converts an ONNX file to a policy, or rewrites a policy for other options or with a checksum.
 ///
 /// # Errors
-/// If the file is not of a network that a policy of the agent can be, or the policy cannot be written.
+/// If the network in the file cannot be a policy of the agent, or the policy cannot be written.
 pub fn import(args: &ImportArgs, json: bool) -> Result<(), CliError> {
     let out = match &args.out {
         Some(out) => out.clone(),
@@ -47,13 +47,13 @@ pub fn import(args: &ImportArgs, json: bool) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Writes what was made of `inputs`, files or folders of runs, whose policies are kept.
+/// Writes the policy made from `inputs`, files or folders of runs, whose policies are kept.
 pub fn save(policy: &Policy, inputs: &[&Path], out: &Path) -> Result<(), CliError> {
     output::check(out, &policy_file::ENDINGS, inputs)?;
     Ok(policy_file::save(policy, out)?)
 }
 
-/// Says what was written.
+/// Prints a line about the written policy.
 pub fn tell(policy: &Policy, out: &Path, json: bool) {
     let meta = policy.meta();
     if json {

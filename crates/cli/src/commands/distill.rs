@@ -1,4 +1,4 @@
-//! `marathon distill`: one policy that does what several do.
+//! `marathon distill`: distills several policies into one.
 
 use crate::args::DistillArgs;
 use crate::error::CliError;
@@ -12,10 +12,10 @@ use marathon_runs::{Setting, output, policy_file, text};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Decisions between two lines where there is no terminal.
+/// Decisions between two lines without a terminal.
 const EVERY: u64 = 1_000_000;
 
-/// What has been learned.
+/// Output of `--json`.
 #[derive(Serialize)]
 struct Report {
     #[serde(serialize_with = "text::path_json")]
@@ -28,12 +28,12 @@ struct Report {
     failures: f64,
 }
 
-/// Distills the teachers into one policy and writes it. A file beside the policy stores the state that a resumed
-/// distillation needs. It is deleted when the policy is complete.
+/// Distills the teachers into one policy and writes it. A file next to the policy stores the state for resuming. It is
+/// deleted when the policy is complete.
 ///
 /// # Errors
-/// If a file is no policy, a teacher does not fit the task, or the policy cannot be written; [`CliError::Interrupted`] after
-/// Ctrl-C, with the policy as it was then.
+/// If a file is not a policy, a teacher does not fit the task, or the policy cannot be written.
+/// [`CliError::Interrupted`] after Ctrl-C, with the current policy written.
 pub fn run(args: &DistillArgs, json: bool) -> Result<(), CliError> {
     let read: Vec<&PathBuf> = args.teachers.iter().chain(&args.options.initialize_from).collect();
     output::check(&args.out, &policy_file::ENDINGS, &read)?;
@@ -42,7 +42,7 @@ pub fn run(args: &DistillArgs, json: bool) -> Result<(), CliError> {
     let task = Setting::named(&args.agent)?.with(&args.task)?;
     let options = &args.options;
     interrupt::install("finishing this round and writing the policy")?;
-    let verb = if notes.exists() { "going on with" } else { "learning" };
+    let verb = if notes.exists() { "continuing" } else { "learning" };
     note(format!(
         "{verb} {} from {} teachers: {} decisions, seed {}",
         task.agent,
@@ -78,7 +78,7 @@ pub fn run(args: &DistillArgs, json: bool) -> Result<(), CliError> {
     }
     if interrupt::requested() {
         let (done, out) = (text::thousands(steps), text::path_word(&args.out));
-        let advice = format!("{out} holds the policy as it is, and the same command goes on");
+        let advice = format!("{out} holds the current policy, and the same command continues");
         return Err(CliError::Interrupted(format!("{done} decisions are done; {advice}")));
     }
     // the policy is complete
@@ -91,7 +91,7 @@ pub fn run(args: &DistillArgs, json: bool) -> Result<(), CliError> {
     Ok(())
 }
 
-/// The file beside the policy that stores the progress.
+/// The file next to the policy that stores the progress.
 fn notes(out: &Path) -> PathBuf {
     let mut name = out.file_name().unwrap_or_default().to_os_string();
     name.push(".unfinished");

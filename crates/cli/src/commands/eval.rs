@@ -1,4 +1,4 @@
-//! `marathon eval`: how good a policy is.
+//! `marathon eval`: evaluates a policy.
 
 use crate::args::EvalArgs;
 use crate::error::CliError;
@@ -10,19 +10,19 @@ use marathon_runs::{Imitation, imitation};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// What `eval --json` prints.
+/// Output of `eval --json`.
 #[derive(Serialize)]
 struct Report<'a> {
     #[serde(flatten)]
     eval: &'a Evaluation,
-    /// How the other roles of the task did.
+    /// Results of the task's other roles.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     roles: BTreeMap<&'a str, &'a Evaluation>,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     imitation: &'a [Imitation],
 }
 
-/// Plays whole episodes and reports on them.
+/// Plays whole episodes and prints the results.
 ///
 /// # Errors
 /// If there is no such policy, or it is for another agent.

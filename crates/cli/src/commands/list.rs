@@ -1,4 +1,4 @@
-//! `marathon list`: the agents, or one of them.
+//! `marathon list`: all agents, or one of them.
 
 use crate::error::CliError;
 use marathon_envs::{CommandRange, ObsGroup, OptionInfo, registry};
@@ -6,13 +6,13 @@ use marathon_physics::lanes::Isa;
 use marathon_runs::terminal::{print_json, say};
 use serde::Serialize;
 
-/// What is told of an agent.
+/// Information about an agent.
 #[derive(Serialize)]
 struct Entry {
     id: String,
     summary: String,
     observation: usize,
-    /// Parts of the observation, with the places where each begins and ends.
+    /// Parts of the observation, with their first index and the index after the last.
     observations: Vec<Part>,
     action: usize,
     action_names: Vec<String>,
@@ -22,11 +22,11 @@ struct Entry {
     max_episode_steps: usize,
     reward_terms: Vec<String>,
     info: Vec<String>,
-    /// Numbers that tell how well the task is done.
+    /// Metrics of the task.
     metrics: Vec<String>,
-    /// What it can be told to do.
+    /// Its command.
     command: Vec<Order>,
-    /// Lowest and highest action per actuator; null for one without bounds.
+    /// Lowest and highest action per actuator; null without bounds.
     action_range: Vec<[Option<f32>; 2]>,
     options: Vec<Argument>,
 }
@@ -38,7 +38,7 @@ struct Part {
     range: [usize; 2],
 }
 
-/// A number that an agent can be told.
+/// A number of an agent's command.
 #[derive(Serialize)]
 struct Order {
     name: String,
@@ -46,7 +46,7 @@ struct Order {
     unit: String,
 }
 
-/// A named argument that an agent takes.
+/// An option of an agent.
 #[derive(Serialize)]
 struct Argument {
     name: &'static str,
@@ -55,10 +55,10 @@ struct Argument {
     about: &'static str,
 }
 
-/// Lists the agents, or tells all about one.
+/// Lists the agents, or shows all about one.
 ///
 /// # Errors
-/// If there is no such agent, or one cannot be simulated.
+/// If the agent does not exist, or cannot be simulated.
 pub fn run(agent: Option<&str>, json: bool) -> Result<(), CliError> {
     let ids = match agent {
         Some(name) => vec![registry::agent(name)?.facts().id],
@@ -73,7 +73,7 @@ pub fn run(agent: Option<&str>, json: bool) -> Result<(), CliError> {
     Ok(())
 }
 
-/// What is told of an agent.
+/// Collects the information about an agent.
 fn entry(id: &str) -> Result<Entry, CliError> {
     let agent = registry::agent(id)?;
     let factory = registry::factory(id, Isa::F32)?;
@@ -100,7 +100,7 @@ fn entry(id: &str) -> Result<Entry, CliError> {
     })
 }
 
-/// A line per agent.
+/// Prints a line per agent.
 fn table(entries: &[Entry]) {
     let width = entries.iter().map(|e| e.id.len()).max().unwrap_or(0);
     say(format!("{:width$}  observation  action  decisions/s  episode", "agent"));
@@ -111,10 +111,12 @@ fn table(entries: &[Entry]) {
             e.id, e.observation, e.action, e.summary
         ));
     }
-    say("\nNames work in any case; without a version they mean the lowest. `marathon list AGENT` tells all about one.");
+    say(
+        "\nCase does not matter in names; without a version they mean the lowest. `marathon list AGENT` shows one in detail.",
+    );
 }
 
-/// All about an agent.
+/// Prints all about an agent.
 fn tell(e: &Entry) {
     say(format!("{}: {}", e.id, e.summary));
     let (rate, seconds) = (1.0 / e.dt, e.dt * e.max_episode_steps as f64);

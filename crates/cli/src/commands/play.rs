@@ -1,4 +1,4 @@
-//! `marathon play`: starts the game, a program of its own because of its size.
+//! `marathon play`: starts the game, which is a separate program because of its size.
 
 use crate::args::PlayArgs;
 use crate::error::CliError;
@@ -12,7 +12,7 @@ const GAME: &str = "marathon-game";
 /// Starts the game and waits for its end.
 ///
 /// # Errors
-/// If it is not there, or ends with an error, about which it has said what there is to say.
+/// If the program is missing or ends with an error, which it has printed itself.
 pub fn run(args: &PlayArgs) -> Result<(), CliError> {
     let own = env::current_exe().ok();
     let path = env::var_os("PATH").unwrap_or_default();
@@ -36,7 +36,7 @@ pub fn run(args: &PlayArgs) -> Result<(), CliError> {
     }
 }
 
-/// The first folder's that has it.
+/// The program in the first folder that has it.
 fn find(folders: impl Iterator<Item = PathBuf>) -> Option<PathBuf> {
     let name = format!("{GAME}{}", env::consts::EXE_SUFFIX);
     folders.map(|folder| folder.join(&name)).find(|path| path.is_file())

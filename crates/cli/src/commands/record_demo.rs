@@ -11,10 +11,10 @@ use serde::Serialize;
 use std::io::{BufWriter, Seek, Write};
 use std::path::PathBuf;
 
-/// Most agents that play side by side.
+/// Maximum number of agents side by side.
 const MAX_AGENTS: usize = 64;
 
-/// What was recorded.
+/// Output of `--json`.
 #[derive(Serialize)]
 struct Report {
     #[serde(serialize_with = "text::path_json")]
@@ -69,8 +69,8 @@ pub fn run(args: &RecordDemoArgs, json: bool) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Agents play side by side, and each plays a number of episodes that is fixed before the start: taking whatever ends first
-/// would favor short episodes. `record` takes each episode when it ends.
+/// Agents play side by side, and the number of episodes of each is fixed before the start. Taking the episodes that end
+/// first would favor short ones. `record` takes each episode when it ends.
 fn play(
     policy: &Policy,
     episodes: usize,

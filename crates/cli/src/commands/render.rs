@@ -1,4 +1,4 @@
-//! `marathon render`: a policy in pictures.
+//! `marathon render`: films a policy.
 
 use crate::args::RenderArgs;
 use crate::error::CliError;
@@ -10,13 +10,13 @@ use marathon_runs::terminal::{print_json, say};
 
 /// Memory per pixel while a frame is drawn, bytes.
 const PIXEL: f64 = 4.0;
-/// Most agents side by side.
+/// Maximum number of agents side by side.
 const MAX_AGENTS: usize = 64;
 
 /// Plays a policy with its best actions and films it.
 ///
 /// # Errors
-/// If there is no such policy, an option makes no sense, or the picture cannot be written.
+/// If there is no such policy, an option is invalid, or the picture cannot be written.
 pub fn run(args: &RenderArgs, json: bool) -> Result<(), CliError> {
     let shot = shot(args)?;
     output::check(&args.out, &["png", "gif", "mp4"], &[&args.source.policy])?;
@@ -41,7 +41,7 @@ fn shot(args: &RenderArgs) -> Result<Shot, CliError> {
     let width = args.width.unwrap_or(width);
     let height = args.height.unwrap_or(match format {
         Format::Png => width.saturating_mul(4) / 3,
-        // video encoders want even sides
+        // video encoders need even sides
         _ => width.saturating_mul(9) / 16 / 2 * 2,
     });
     let (length, fps) = (args.film.seconds.unwrap_or(seconds), args.film.fps.unwrap_or(fps));
@@ -60,7 +60,7 @@ fn shot(args: &RenderArgs) -> Result<Shot, CliError> {
             usage("--frames is for .png; a film has --seconds and --fps".into())
         }
         _ => {
-            // pixels of all frames held at once, and of the picture made of them
+            // pixels of all frames in memory, and of the picture made from them
             let pixels = width as f64 * height as f64 * if format == Format::Png { 2.0 * frames as f64 } else { 2.0 };
             let asked = MEMORY.check(PIXEL * pixels);
             asked.map_err(|error| CliError::Usage(format!("--width and --height: the picture {error}")))?;

@@ -1,15 +1,15 @@
-//! `marathon rollout-worker`: plays for `marathon train --processes`.
+//! `marathon rollout-worker`: plays rollouts for `marathon train --processes`.
 
 use crate::error::CliError;
 use marathon_runs::processes;
 use marathon_runs::terminal::interrupt;
 
-/// Plays what the learner asks for, until it hangs up.
+/// Plays rollouts for the learner until it closes the connection.
 ///
 /// # Errors
-/// If what is asked for makes no sense.
+/// If a request is invalid.
 pub fn run() -> Result<(), CliError> {
-    // Ctrl-C is for the learner, which finishes its iteration
+    // the learner handles Ctrl-C and finishes its iteration
     interrupt::listen(|| {})?;
     Ok(processes::serve()?)
 }

@@ -15,7 +15,7 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// A recording as a clip.
+/// Converts a recording to a clip.
 pub fn import(args: &ImportArgs, json: bool) -> Result<(), CliError> {
     check_edits(&args.edits)?;
     let path = &args.recording;
@@ -24,9 +24,7 @@ pub fn import(args: &ImportArgs, json: bool) -> Result<(), CliError> {
         return again(args, json);
     }
     let Some(name) = &args.model else {
-        return Err(CliError::Usage(
-            "--model is missing, expected the character that is to move: an agent or an MJCF file".into(),
-        ));
+        return Err(CliError::Usage("--model is missing, expected a character: an agent or an MJCF file".into()));
     };
     let model = model::load(name)?;
     let known_as = match &args.edits.mapping {
@@ -80,7 +78,7 @@ fn again(args: &ImportArgs, json: bool) -> Result<(), CliError> {
     Ok(())
 }
 
-/// A clip of one model as a clip of another.
+/// Converts a clip of one model to a clip of another.
 pub fn retarget(args: &RetargetArgs, json: bool) -> Result<(), CliError> {
     check_edits(&args.edits)?;
     check_out(&args.clip, &args.edits.out)?;
@@ -100,12 +98,12 @@ fn check_out(input: &Path, out: &Path) -> Result<(), CliError> {
     let same = input.canonicalize().ok().zip(out.canonicalize().ok()).is_some_and(|(input, out)| input == out);
     if input == out || same {
         let found = path_word(out);
-        return Err(CliError::Usage(format!("--out is {found}, which is read; expected another file")));
+        return Err(CliError::Usage(format!("--out is {found}, which is also the input; expected another file")));
     }
     Ok(())
 }
 
-/// What can be told to be wrong before anything is read.
+/// Checks of the options that need no file.
 fn check_edits(edits: &Edits) -> Result<(), CliError> {
     if edits.out.extension().is_none_or(|extension| extension != "motion") {
         let found = path_word(&edits.out);
@@ -159,13 +157,13 @@ fn write(
         };
         if seam.gapes() && edits.looping == Looping::Wrap {
             return Err(CliError::Usage(format!(
-                "--loop wrap: {}: {}, expected two poses that are alike; --trim FROM TO chooses them",
+                "--loop wrap: {}: {}, expected two similar poses; --trim FROM TO selects them",
                 path_word(path),
                 differ()
             )));
         }
         if seam.shows() {
-            notes.push(format!("{}; a loop spreads this over the cycle: choose other ends with --trim", differ()));
+            notes.push(format!("{}; a loop spreads this over the cycle: select other ends with --trim", differ()));
         }
         animation = animation.looped(path)?;
     }

@@ -1,4 +1,4 @@
-//! `marathon motion`: from a recording of a person to a clip of a character, and a look at it.
+//! `marathon motion`: converts recordings of people to clips of a character, and checks and draws clips.
 
 mod import;
 mod model;
@@ -24,45 +24,45 @@ Examples:
 #[derive(Debug, clap::Args)]
 #[command(arg_required_else_help = true, after_help = HELP)]
 pub struct MotionArgs {
-    /// What to do.
+    /// Command.
     #[command(subcommand)]
     pub what: What,
 }
 
-/// What to do.
+/// Command.
 #[derive(Debug, Subcommand)]
 pub enum What {
-    /// Read a recording (.bvh, .glb, .gltf, .vrm, .vrma, or .txt and .json of DeepMimic) and write it as a clip of a character.
+    /// Convert a recording (.bvh, .glb, .gltf, .vrm, .vrma, or .txt and .json of DeepMimic) to a clip of a character.
     Import(ImportArgs),
-    /// Write a clip of one character as one of another.
+    /// Convert a clip of one character to a clip of another.
     Retarget(RetargetArgs),
-    /// Measure what is wrong with clips; the exit code is 1 if anything is.
+    /// Check clips for problems; the exit code is 1 if there are any.
     Check(CheckArgs),
     /// Draw a clip, alone or with a policy that follows it: a strip of frames, an animation or a film.
     Render(RenderArgs),
 }
 
-/// Whether a motion begins again at its end.
+/// Whether a motion loops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Looping {
     /// As the recording says; most formats say nothing, which means none.
     Auto,
-    /// The last pose is the first again, farther on.
+    /// Loops: the last pose repeats the first, farther on.
     Wrap,
-    /// It ends.
+    /// Ends.
     None,
 }
 
-/// What is done to a motion, and what is written about it.
+/// Edits of a motion, and its description.
 #[derive(Debug, clap::Args)]
 pub struct Edits {
     /// Clip to write; its name ends in .motion.
     #[arg(long, value_name = "F.motion")]
     pub out: PathBuf,
-    /// Which joint moves which body [default: the mapping that comes with Marathon for the model].
+    /// Mapping from skeleton joints to bodies [default: Marathon's built-in one for the model].
     #[arg(long, value_name = "F.json")]
     pub mapping: Option<PathBuf>,
-    /// Whether the motion begins again at its end.
+    /// Whether the motion loops.
     #[arg(long = "loop", value_name = "HOW", value_enum, default_value_t = Looping::Auto)]
     pub looping: Looping,
     /// Part of the recording to use, seconds.
@@ -74,7 +74,7 @@ pub struct Edits {
     /// Standard deviation of a Gaussian filter over the recording, seconds.
     #[arg(long, value_name = "S", default_value_t = 0.0)]
     pub smooth: f64,
-    /// Factor on the law of balance: only the ground, where it is touched, changes how the figure turns.
+    /// Factor on the balance law: only ground contacts change the angular momentum.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
     pub balance: f64,
     /// Exchange left and right.
@@ -83,10 +83,10 @@ pub struct Edits {
     /// Begin with the heading +x.
     #[arg(long)]
     pub forward: bool,
-    /// Name of the motion [default: that of the file written].
+    /// Name of the motion [default: that of the output file].
     #[arg(long, value_name = "TEXT")]
     pub name: Option<String>,
-    /// Who made the recording.
+    /// Author or source of the recording.
     #[arg(long, value_name = "TEXT")]
     pub source: Option<String>,
     /// License of the recording.
@@ -123,12 +123,12 @@ fn up(text: &str) -> Result<Up, String> {
 /// Options of `motion retarget`.
 #[derive(Debug, clap::Args)]
 pub struct RetargetArgs {
-    /// Clip to read: a .motion file, or the name of one that comes with Marathon.
+    /// Clip to read: a .motion file, or the name of one of Marathon's clips.
     pub clip: PathBuf,
-    /// Character of the clip that is read: an agent, or an MJCF file [default: the agent that the clip names].
+    /// Character of the input clip: an agent, or an MJCF file [default: the agent that the clip names].
     #[arg(long, value_name = "AGENT|F.xml")]
     pub from: Option<String>,
-    /// Character of the clip that is written: an agent, or an MJCF file.
+    /// Character of the output clip: an agent, or an MJCF file.
     #[arg(long, value_name = "AGENT|F.xml")]
     pub model: String,
     #[command(flatten)]
@@ -138,7 +138,7 @@ pub struct RetargetArgs {
 /// Options of `motion check`.
 #[derive(Debug, clap::Args)]
 pub struct CheckArgs {
-    /// Clips to read: .motion files, or names of those that come with Marathon.
+    /// Clips to read: .motion files, or names of Marathon's clips.
     #[arg(required = true)]
     pub clips: Vec<PathBuf>,
     /// Character: an agent, or an MJCF file [default: the agent that the clip names].
@@ -149,7 +149,7 @@ pub struct CheckArgs {
 /// Options of `motion render`.
 #[derive(Debug, clap::Args)]
 pub struct RenderArgs {
-    /// Clip to read: a .motion file, or the name of one that comes with Marathon.
+    /// Clip to read: a .motion file, or the name of one of Marathon's clips.
     pub clip: PathBuf,
     /// Character: an agent, or an MJCF file [default: the agent that the clip names].
     #[arg(long, value_name = "AGENT|F.xml")]
@@ -157,14 +157,14 @@ pub struct RenderArgs {
     /// Picture to write: .png is a strip of frames, .gif an animation, .mp4 a film (needs ffmpeg).
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Policy that follows the clip, a file or the folder of a run: draw it, with the clip as its ghost, from the clip's first
-    /// frame on.
+    /// Policy that follows the clip, a file or the folder of a run: draw it, with the clip as its ghost, from the
+    /// clip's first frame on.
     #[arg(long, value_name = "RUN|F", conflicts_with = "model")]
     pub policy: Option<PathBuf>,
-    /// Where the ghost is: inside the policy's figure, or beside it [default: inside].
+    /// Place of the ghost: inside the policy's character, or beside it [default: inside].
     #[arg(long, value_name = "WHERE", num_args = 0..=1, default_missing_value = "inside", requires = "policy")]
     pub ghost: Option<Ghost>,
-    /// Arguments of the policy's task.
+    /// Options of the policy's task.
     #[command(flatten)]
     pub task: TaskOptions,
     /// Length, seconds [default: that of the clip; 8 for a film of a policy whose clip loops].

@@ -13,7 +13,7 @@ use marathon_runs::clips::missing;
 use marathon_runs::text::{nearest_path, path_word};
 use std::path::Path;
 
-/// A model by the name of an agent or an MJCF file.
+/// Loads a model by the name of an agent, or from an MJCF file.
 pub fn load(name: &str) -> Result<Model, CliError> {
     match Path::new(name).extension() {
         Some(extension) if extension.eq_ignore_ascii_case("xml") => Ok(Model::from_xml_file(name)?),
@@ -21,7 +21,7 @@ pub fn load(name: &str) -> Result<Model, CliError> {
     }
 }
 
-/// The model that was asked for, or the one that the clip names.
+/// The requested model, or the one that the clip names.
 pub fn of_clip(path: &Path, clip: &Clip, asked: Option<&str>) -> Result<Model, CliError> {
     let model = match asked {
         Some(name) => load(name)?,
@@ -31,7 +31,7 @@ pub fn of_clip(path: &Path, clip: &Clip, asked: Option<&str>) -> Result<Model, C
     Ok(model)
 }
 
-/// The model of the first agent that moves as the clip does and has the name that the clip says.
+/// The model of the first agent with the joints and the model name of the clip.
 fn named(path: &Path, clip: &Clip) -> Result<Model, CliError> {
     let name = &clip.about().model;
     for id in registry::ids() {
@@ -40,11 +40,11 @@ fn named(path: &Path, clip: &Clip) -> Result<Model, CliError> {
             return Ok(model);
         }
     }
-    let text = format!("{} is of the model {name:?}, which is no agent's; say --model", path_word(path));
+    let text = format!("{} is for the model {name:?}, which no agent has; pass --model", path_word(path));
     Err(CliError::Usage(text))
 }
 
-/// Reads a clip: a file, or one that comes with Marathon, by its name.
+/// Reads a clip: a file, or one of Marathon's clips by its name.
 pub fn clip(path: &Path) -> Result<Clip, CliError> {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
     if ENDINGS.contains(&ending.as_str()) && ending != "json" {

@@ -1,4 +1,4 @@
-//! `marathon motion render --policy`: a policy beside the clip that it follows.
+//! `marathon motion render --policy`: a policy together with the clip that it follows.
 
 use super::{RenderArgs, model, show};
 use crate::error::CliError;
@@ -13,7 +13,7 @@ use marathon_runs::text::path_word;
 use marathon_runs::{PolicySource, TaskOptions, policy_file};
 use std::path::Path;
 
-/// Shortest film of a clip that loops, s.
+/// Minimum duration of a film of a looping clip, s.
 const LOOP: f64 = 8.0;
 
 /// Draws a policy with the clip as its ghost, from the clip's first frame on.
@@ -34,7 +34,7 @@ pub fn render(args: &RenderArgs, policy: &Path, json: bool) -> Result<(), CliErr
     Ok(())
 }
 
-/// The arguments with which the policy's task follows the clip from its first frame on, and those of the user.
+/// The options with which the policy's task follows the clip from its first frame on, followed by the user's.
 fn task(args: &RenderArgs, clip: &Clip, policy: &PolicyMeta) -> Result<TaskOptions, CliError> {
     let agent = registry::agent(&policy.agent)?;
     let mut given = Vec::new();
@@ -44,7 +44,7 @@ fn task(args: &RenderArgs, clip: &Clip, policy: &PolicyMeta) -> Result<TaskOptio
             return Err(CliError::Usage(format!("--option clip stands beside the clip {found}, expected one of them")));
         }
         let text = args.clip.to_str().ok_or_else(|| {
-            CliError::Usage(format!("the path {} is not UTF-8, which a task's clip has to be", path_word(&args.clip)))
+            CliError::Usage(format!("the path {} is not UTF-8, as required for a task's clip", path_word(&args.clip)))
         })?;
         given.push(("clip".into(), Value::Text(text.into())));
     } else {
@@ -53,12 +53,12 @@ fn task(args: &RenderArgs, clip: &Clip, policy: &PolicyMeta) -> Result<TaskOptio
     if agent.has_option("start") {
         given.push(("start".into(), Value::Text("first".into())));
     }
-    // the later one counts
+    // later options have precedence
     given.extend(args.task.given.iter().cloned());
     Ok(TaskOptions { given })
 }
 
-/// A task with a clip of its own shows this clip and no other.
+/// Checks that a task with its own clip shows this clip.
 fn check_own(path: &Path, clip: &Clip, policy: &PolicyMeta) -> Result<(), CliError> {
     let (path, task) = (path_word(path), &policy.agent);
     let motion = |clip: &Clip| clip.clone().with_about(About::default());

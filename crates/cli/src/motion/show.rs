@@ -40,7 +40,7 @@ pub fn document(path: &Path, report: &Report) -> Value {
     json!({ "clip": path.to_string_lossy(), "report": report, "warnings": report.warnings(), "notes": report.notes() })
 }
 
-/// A report in a line.
+/// A report in one line.
 pub fn line(report: &Report) -> String {
     format!(
         "{} frames, {:.2} s; stands in {:.0} % of it, slides {:.1} cm at most and {:.1} cm/s on average; \
@@ -54,7 +54,7 @@ pub fn line(report: &Report) -> String {
     )
 }
 
-/// What retargeting has left of a recording, in a line.
+/// The difference between a clip and its recording in one line.
 pub fn fit_line(fit: &Fit) -> String {
     format!(
         "its parts are {:.1} cm and {:.0} degrees from the recording's on average; {} is {:.0} cm away in frame {}",
@@ -66,7 +66,7 @@ pub fn fit_line(fit: &Fit) -> String {
     )
 }
 
-/// The picture that is asked for of a clip; the seconds are those of a picture without `--seconds`.
+/// The requested picture of a clip. `seconds` is the default of `--seconds`.
 pub fn shot(args: &RenderArgs, seconds: f64) -> Result<Shot, CliError> {
     let length = args.seconds.unwrap_or(seconds);
     if !(length > 0.0 && length <= 3600.0) {
@@ -78,7 +78,7 @@ pub fn shot(args: &RenderArgs, seconds: f64) -> Result<Shot, CliError> {
     let format = Format::of(&args.out)?;
     let still = format == Format::Png;
     let width = args.width.unwrap_or(if still { 240 } else { 480 });
-    // video encoders want even sides
+    // video encoders need even sides
     let height = if still { width * 4 / 3 } else { width * 9 / 16 / 2 * 2 };
     Ok(Shot { format, width, height, length, frames: args.frames as usize, fps: args.fps })
 }
@@ -86,9 +86,7 @@ pub fn shot(args: &RenderArgs, seconds: f64) -> Result<Shot, CliError> {
 /// Draws a clip.
 pub fn render(args: &RenderArgs, json: bool) -> Result<(), CliError> {
     if let Some((name, _)) = args.task.given.first() {
-        return Err(CliError::Usage(format!(
-            "--option {name} is for the task of a policy, expected --policy beside it"
-        )));
+        return Err(CliError::Usage(format!("--option {name} is for the task of a policy; it requires --policy")));
     }
     let clip = model::clip(&args.clip)?;
     let model = model::of_clip(&args.clip, &clip, args.model.as_deref())?;

@@ -22,8 +22,8 @@ pub struct Found {
     pub cpu_seconds: f64,
     /// How well the policy follows its clip.
     pub imitation: Imitation,
-    /// For policies on the way: agent-steps, processor seconds, and the share of the longest time for which the policy follows
-    /// the clip from its beginning.
+    /// For intermediate policies: agent-steps, processor seconds, and the fraction of the longest time for which the
+    /// policy follows the clip from its beginning.
     pub curve: Vec<[f64; 3]>,
 }
 

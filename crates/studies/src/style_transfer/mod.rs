@@ -1,4 +1,4 @@
-//! Style transfer: Marathon Man learns each motion clip with his default configuration.
+//! Style transfer: Marathon Man learns each motion clip with its default configuration.
 
 mod findings;
 
@@ -22,16 +22,16 @@ use std::path::{Path, PathBuf};
 
 /// Default folder of the kept runs.
 const KEEP: &str = "runs/style-transfer";
-/// Episodes of the evaluation of a policy on the way.
+/// Episodes of the evaluation of an intermediate policy.
 const EPISODES: usize = 16;
-/// Smallest ratio of the steps of two policies on the way that are evaluated.
+/// Smallest ratio of the steps of two evaluated intermediate policies.
 const APART: f64 = 1.1;
-/// Most lines in the picture; more cannot be told apart.
+/// Maximum number of lines in the picture, so that they can be distinguished.
 const LINES: usize = 16;
 
 /// A clip and its task.
 struct Job {
-    /// The clip's name; for other figures than Marathon Man, the name of the task.
+    /// The clip's name; for characters other than Marathon Man, the name of the task.
     clip: String,
     task: String,
     /// The clip's file.
@@ -43,7 +43,7 @@ struct Job {
 }
 
 impl Job {
-    /// Its training with a seed; keeps all policies on the way for the evaluation.
+    /// Its training with a seed. It keeps all intermediate policies for the evaluation.
     fn training(&self, seed: u64) -> kept::Job {
         let loaded = Loaded { keep_checkpoints: usize::MAX, ..default_for(&self.task) };
         let (task, arguments) = (self.task.clone(), TaskOptions::default());
@@ -51,13 +51,13 @@ impl Job {
     }
 }
 
-/// Trains and evaluates; with `kept_only`, uses the kept runs and trains nothing.
+/// Trains and evaluates. With `kept_only`, uses the kept runs without training.
 ///
 /// # Errors
-/// If a clip is unknown, or a run cannot be trained or read, or was made with another configuration.
+/// If a clip is unknown, or a run cannot be trained or read, or has another configuration.
 pub fn run(options: &Options, clips: &[String], kept_only: bool) -> Result<Record, StudyError> {
     let jobs = jobs(clips)?;
-    interrupt::install("finishing this iteration; the same command goes on from there")?;
+    interrupt::install("finishing this iteration; the same command continues")?;
     let keep = options.keep.clone().unwrap_or_else(|| PathBuf::from(KEEP));
     let (mut rows, mut lines) = (Vec::new(), Vec::new());
     for job in &jobs {
@@ -169,7 +169,7 @@ fn jobs(clips: &[String]) -> Result<Vec<Job>, StudyError> {
     Ok(all)
 }
 
-/// Reads a finished run and evaluates its policies on the way.
+/// Reads a finished run and evaluates its intermediate policies.
 fn measured(job: &Job, path: &Path) -> Result<Found, StudyError> {
     let (folder, run): (_, RunFile) = RunFolder::open(path)?;
     let summary = kept::summary(&folder)?;
@@ -178,7 +178,7 @@ fn measured(job: &Job, path: &Path) -> Result<Found, StudyError> {
             &folder.summary(),
             "imitation",
             "nothing",
-            "what a finished run tells of its clip",
+            "the results of a finished run for its clip",
         ));
     };
     let history = History::read(&folder.progress())?;
@@ -186,7 +186,7 @@ fn measured(job: &Job, path: &Path) -> Result<Found, StudyError> {
     let clock: Vec<(f64, f64)> = column("steps").zip(column("cpu_seconds")).collect();
     let mut policies: Vec<(u64, PathBuf)> = vec![(summary.steps, folder.policy())];
     let kept = folder.policies();
-    // a short run has no policies on the way
+    // a short run has no intermediate policies
     for entry in std::fs::read_dir(&kept).into_iter().flatten() {
         let path = entry.map_err(StudyError::io(&kept, "read"))?.path();
         let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
