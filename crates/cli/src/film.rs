@@ -71,7 +71,7 @@ pub struct Report {
     /// a ghost.
     #[serde(skip_serializing_if = "Option::is_none")]
     joint_error: Option<f64>,
-    /// Mean distance of the root from that of the clip until the falls, m; with a ghost.
+    /// Mean distance between the roots of the agent and the clip until the falls, m. Only with a ghost.
     #[serde(skip_serializing_if = "Option::is_none")]
     root_error: Option<f64>,
 }

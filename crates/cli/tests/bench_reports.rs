@@ -1,4 +1,4 @@
-//! `marathon bench` measures what it says, for people and for programs.
+//! `marathon bench` measures what it documents, with output for people and for programs.
 
 mod common;
 
@@ -17,7 +17,7 @@ fn json(args: &[&str]) -> Value {
     serde_json::from_slice(&out.stdout).expect("one JSON object")
 }
 
-/// What every row has; returns the rows.
+/// Checks the common fields of every row. Returns the rows.
 fn check(document: &Value, bench: &str, threads: u64) -> Vec<Value> {
     assert_eq!(document["bench"], bench);
     assert!(document["machine"]["cores"].as_u64().unwrap() >= 1);
@@ -106,7 +106,7 @@ fn both_engines_run_the_same_workload() {
     }
 }
 
-/// The same states and controls on both sides: half a second later, still as many contacts.
+/// The same states and controls on both sides: half a second later, the number of contacts still agrees.
 #[test]
 fn both_engines_do_what_a_policy_did() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/policies/humanoid.safetensors");
@@ -135,7 +135,7 @@ fn both_engines_do_what_a_policy_did() {
 fn one_agent_of_a_crowd_is_timed_from_its_first_step() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("crates.xml");
-    // a stack of crates; motors would throw them about
+    // a stack of crates; motors would throw them around
     let body = |k: usize| {
         let z = 0.1 + 0.2 * k as f64;
         format!(r#"<body pos="0 0 {z}"><joint name="x{k}" type="free"/><geom type="box" size=".2 .2 .1"/></body>"#)
@@ -166,7 +166,7 @@ fn one_agent_of_a_crowd_is_timed_from_its_first_step() {
 fn contacts_between_bodies_count_on_both_sides() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("pair.xml");
-    // two balls that touch each other and no ground
+    // two balls that touch each other, without ground
     let model = r#"<mujoco><option gravity="0 0 0"/><worldbody><body><freejoint/><geom size="0.1"/></body>
         <body pos="0.15 0 0"><joint type="hinge" axis="0 0 1" pos="0.3 0 0" stiffness="200" damping="5"/><geom size="0.1"/>
         </body><body pos="-0.15 0 0"><joint type="hinge" axis="0 0 1" pos="-0.3 0 0" stiffness="200" damping="5"/>
@@ -207,7 +207,7 @@ fn a_python_without_mujoco_is_told_what_to_install() {
         std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
         path
     };
-    // a Python without packages, something that is no Python, nothing
+    // a Python without packages, a program other than Python, a missing program
     let bare = script("bare", &format!("exec '{}' -S -I \"$@\"", python().display()));
     let broken = script("broken", "echo out of order >&2; exit 3");
     let missing = folder.path().join("missing");
@@ -228,7 +228,7 @@ fn a_python_without_mujoco_is_told_what_to_install() {
 #[cfg(unix)]
 #[test]
 fn what_mujoco_refuses_is_passed_on() {
-    // a model that says something else when it is read again
+    // a model that is different when it is read again
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("model.xml");
     let ball = r#"<mujoco><worldbody><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#;
@@ -271,7 +271,7 @@ fn people_get_a_table() {
     assert_eq!(header.len(), rows[0].len(), "{text}");
 }
 
-/// A policy that obeys nobody.
+/// A policy that ignores commands.
 const HOPPER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/policies/hopper.safetensors");
 
 #[test]
@@ -287,7 +287,7 @@ fn controller_tells_how_a_policy_obeys() {
     let lengths = ["responses", "turns", "pushes"].map(|key| document[key].as_array().unwrap().len());
     assert_eq!(lengths, [6, 3, 3]);
     for response in document["responses"].as_array().unwrap() {
-        // four seconds of 40 decisions; those who have fallen before are not counted
+        // four seconds of 40 decisions; agents that have fallen before are not counted
         assert!(response["agents"].as_u64().unwrap() <= 6 && response["speeds"].as_array().unwrap().len() == 160);
     }
     assert_eq!(&std::fs::read(&picture).unwrap()[..8], b"\x89PNG\r\n\x1a\n");

@@ -51,8 +51,8 @@ fn what_cannot_be_kept_is_refused_before_the_first_step() {
     assert_no_leftovers(path);
 }
 
-/// A learning rate that is far too large stops the distillation at the first number that is not finite. No unusable
-/// file is left.
+/// A learning rate that is far too large stops the distillation at the first non-finite number. No unusable file is
+/// left.
 #[test]
 fn a_rate_that_is_too_large_leaves_no_policy() {
     let temp = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Every error names the thing and the place, what was expected, and the nearest valid choice.
+//! Every error names the item and the place, the valid values, and the nearest valid choice.
 
 mod common;
 
@@ -55,7 +55,7 @@ fn runs_are_not_overwritten() {
     says(&fail(temp.path(), 1, &["train", "--resume", "a", "--steps", "1M"]), &["a: run", "another process"]);
 }
 
-/// `run.json` says what the run is; one that was changed is another run.
+/// `run.json` describes the run. A changed description is another run.
 #[test]
 fn a_changed_description_is_refused() {
     let temp = tempfile::tempdir().unwrap();
@@ -102,7 +102,7 @@ fn a_changed_description_is_refused() {
         std::fs::write(&path, with(&run, pointer, value)).unwrap();
         says(&fail(temp.path(), 1, &resume), &[text]);
     }
-    // the largest numbers are no trouble
+    // the largest numbers work
     for key in ["summary_freq", "checkpoint_interval", "keep_checkpoints"] {
         run[key] = u64::MAX.into();
     }
@@ -134,7 +134,7 @@ fn policies_must_fit_their_agent() {
     says(&fail(temp.path(), 2, &["eval", "a", "--episodes", "0"]), &["--episodes", "1..=10000000"]);
     assert!(!temp.path().join("x.gif").exists());
 
-    // damaged numbers are found before they act
+    // damaged numbers are found before they are used
     let path = temp.path().join("a/checkpoint");
     let state = common::files(&path).into_iter().find(|f| f.extension().is_some_and(|e| e == "safetensors")).unwrap();
     let mut bytes = std::fs::read(&state).unwrap();
@@ -160,7 +160,7 @@ fn json_carries_errors_too() {
     assert_eq!(output.status.code(), Some(1));
     let error = json(&String::from_utf8(output.stdout).unwrap());
     assert!(error["error"].as_str().unwrap().contains("did you mean 'Hopper-v0'?"));
-    // those of the command line itself
+    // errors of the command line itself
     for (words, part) in [
         (&["train", "hopper", "--sede", "3", "--json"][..], "--seed"),
         (&["--json", "trian"], "'train'"),
@@ -175,7 +175,7 @@ fn json_carries_errors_too() {
     }
 }
 
-/// A run whose checkpoint is gone does not begin again over what it has learned.
+/// A run whose checkpoint is gone does not start over and overwrite its results.
 #[test]
 fn a_lost_checkpoint_is_told() {
     let temp = tempfile::tempdir().unwrap();
@@ -187,7 +187,7 @@ fn a_lost_checkpoint_is_told() {
     assert_eq!(std::fs::read(temp.path().join("a/policy.safetensors")).unwrap(), policy);
 }
 
-/// Learning rates beyond all measure: what cannot be a policy is none, and what was left out is told.
+/// Extremely large learning rates: no invalid policy is written, and skipped minibatches are reported.
 #[test]
 fn a_training_that_diverges_says_so() {
     let temp = tempfile::tempdir().unwrap();
@@ -215,7 +215,7 @@ fn a_training_that_diverges_says_so() {
     assert!(skipped > 1 && common::stderr(&output).contains(&note), "{skipped}: {}", common::stderr(&output));
 }
 
-/// The longest names that there can be.
+/// The longest possible names.
 #[test]
 fn names_may_be_as_long_as_names_can_be() {
     let temp = tempfile::tempdir().unwrap();

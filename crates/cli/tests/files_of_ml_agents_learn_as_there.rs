@@ -1,7 +1,7 @@
-//! A file of ML-Agents trains here to what it trains to there. `mlagents-learn` 1.1.0, with the paper's settings for Hopper
-//! (supplement C) and a million steps through our player, ends at 487 to 496 in five seeds (docs/studies/mlagents-agreement.md);
-//! within 15 % is 418 and more. What a file does not say and ML-Agents does anyway decides, and whether the statistics of
-//! observations disturb what has been learned: seed 1 falls (38) without `follow_statistics`.
+//! A file of ML-Agents gives the same result here as in ML-Agents. `mlagents-learn` 1.1.0, with the paper's settings
+//! for Hopper (supplement C) and a million steps through our player, ends at 487 to 496 in five seeds
+//! (docs/studies/mlagents-agreement.md). Within 15 % is 418 and more. ML-Agents' unwritten defaults matter, and so does
+//! following the observation statistics: without `follow_statistics`, seed 1 fails (38).
 
 mod common;
 

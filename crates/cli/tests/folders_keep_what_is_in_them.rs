@@ -1,5 +1,5 @@
-//! Training takes a folder that is new or empty, and nothing else is ever overwritten or deleted; a start that fails leaves
-//! everything as it was, so that the corrected command works.
+//! Training uses a new or empty folder, and never overwrites or deletes other files. A failed start leaves everything
+//! as it was, so that the corrected command works.
 
 mod common;
 
@@ -7,7 +7,7 @@ use common::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// All files under a folder with what is in them.
+/// All files under a folder with their contents.
 fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     files(folder).into_iter().map(|path| (path.clone(), std::fs::read(path).unwrap())).collect()
 }
@@ -70,7 +70,7 @@ fn a_failed_start_leaves_nothing() {
     assert_eq!(std::fs::read_dir(path).unwrap().count(), 0, "{:?}", files(path));
     fail(path, 2, &refused[..6]);
     assert_eq!(std::fs::read_dir(path).unwrap().count(), 0, "{:?}", files(path));
-    // a folder that was there stays
+    // an existing folder stays
     std::fs::create_dir(path.join("mine")).unwrap();
     fail(path, 2, &[&refused[..6], &["--out", "mine"]].concat());
     assert_eq!(std::fs::read_dir(path.join("mine")).unwrap().count(), 0);
@@ -103,7 +103,7 @@ fn a_start_that_was_killed_early_does_not_block_the_same_command() {
     }
 }
 
-/// More memory than there is, by a limit or by numbers that no computer has.
+/// More memory than available, by a limit or by numbers that no computer has.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_run_that_does_not_fit_into_memory_is_an_error_and_leaves_nothing() {
@@ -135,7 +135,7 @@ behaviors:
     succeed(temp.path(), &train("a"));
 }
 
-/// A program that could not even clean up, such as one killed before its first iteration, blocks nobody either.
+/// A program that could not clean up, such as one killed before its first iteration, does not block a new run either.
 #[test]
 fn a_run_without_an_iteration_is_begun_anew() {
     let temp = tempfile::tempdir().unwrap();

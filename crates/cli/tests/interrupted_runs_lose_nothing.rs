@@ -1,4 +1,4 @@
-//! An interrupted run, resumed, ends with the bits of a run that was never interrupted, and with its rows and events.
+//! A resumed run ends with the bits of an uninterrupted run, and with its rows and events.
 
 #![cfg(unix)]
 
@@ -28,7 +28,7 @@ fn finish(child: Child) -> Output {
     child.wait_with_output().expect("the command ends")
 }
 
-/// Steps and values of every scalar of a run, whatever file they are in. Times are left out.
+/// Steps and values of every scalar of a run over all its files, without times.
 fn events(run: &Path) -> Vec<(u64, String, u32)> {
     let mut all = Vec::new();
     for path in event_files(run) {
@@ -105,7 +105,7 @@ fn a_resumed_run_equals_one_never_interrupted() {
     assert_eq!(summary, read_json(&run.join("summary.json")));
     let steps = summary["steps"].as_u64().unwrap();
     assert!(steps < 400_000, "it was interrupted after {steps} steps");
-    // what is there can be used
+    // the files so far are usable
     assert_no_leftovers(&run);
     succeed(temp.path(), &["eval", "parts", "--episodes", "2"]);
 
@@ -115,7 +115,7 @@ fn a_resumed_run_equals_one_never_interrupted() {
     wait_for_lines(&run.join("progress.csv"), rows + 5);
     interrupt(&child);
     assert_eq!(finish(child).status.code(), Some(130));
-    // rows and events beyond the checkpoint, as a process that was killed leaves them
+    // rows and events beyond the checkpoint, as a killed process leaves them
     let mut table = std::fs::read_to_string(run.join("progress.csv")).unwrap();
     let last = table.lines().last().unwrap().split_once(',').unwrap();
     let next = format!("{},{}\n1", last.0.parse::<u64>().unwrap() + 1, last.1);
@@ -154,7 +154,7 @@ fn a_complete_run_goes_on_with_more_steps_only() {
     assert_eq!(read_json(&temp.path().join("runs/hopper-1/summary.json"))["steps"], 40_960);
 }
 
-/// Killed between its last checkpoint and its summary, a run is not complete: the same command finishes it.
+/// A run that was killed between its last checkpoint and its summary is not complete. The same command finishes it.
 #[test]
 fn a_run_killed_at_its_end_is_finished_by_the_same_command() {
     let temp = tempfile::tempdir().unwrap();
@@ -166,7 +166,7 @@ fn a_run_killed_at_its_end_is_finished_by_the_same_command() {
     let (whole, policy) = (read_json(&run.join("summary.json")), tensors(&run.join("policy.safetensors")));
     assert_eq!(whole["steps"], 40_960);
 
-    // what a kill after the checkpoint leaves
+    // the state after a kill that follows the checkpoint
     early.iter().for_each(|(name, bytes)| std::fs::write(run.join(name), bytes).unwrap());
     succeed(temp.path(), &extend);
     assert_eq!(read_json(&run.join("summary.json")), whole);
@@ -179,7 +179,7 @@ fn a_run_killed_at_its_end_is_finished_by_the_same_command() {
     assert!(text.contains("the run is complete with 40,960 steps"), "{text}");
 }
 
-/// Agents whose simulation broke down are told of at the end, those of the run's earlier parts among them.
+/// The end of a run reports agents whose simulation became non-finite, including those of the run's earlier parts.
 #[test]
 fn breakdowns_are_counted_over_all_parts() {
     let temp = tempfile::tempdir().unwrap();
@@ -188,7 +188,7 @@ fn breakdowns_are_counted_over_all_parts() {
     assert!(!stderr(&output).contains("broke down"), "{}", stderr(&output));
     assert_eq!(read_json(&run.join("summary.json"))["diverged"], 0);
 
-    // nothing that a user can do makes these agents break down, so a row says that three did
+    // no user action makes these agents fail, so a row says that three did
     let rows = std::fs::read_to_string(run.join("progress.csv")).unwrap();
     let column = rows.lines().next().unwrap().split(',').position(|name| name == "diverged").unwrap();
     let marked = |(i, row): (usize, &str)| {
@@ -217,14 +217,14 @@ fn a_second_interruption_ends_at_once_and_breaks_nothing() {
     interrupt(&child);
     assert_eq!(child.wait().unwrap().code(), Some(130));
     assert!(lines.any(|line| line == "aborted"));
-    // nothing was learned yet, so it begins again
+    // nothing was learned yet, so it starts again
     assert!(!temp.path().join("a/policy.safetensors").exists());
     assert_no_leftovers(&temp.path().join("a"));
     succeed(temp.path(), &["train", "--resume", "a", "--steps", "500k"]);
     assert_eq!(timeless_rows(&temp.path().join("a/progress.csv"))[1][0], "1");
 }
 
-/// `nohup` has a command ignore that its terminal is gone; it keeps doing so.
+/// `nohup` makes a command ignore the end of its terminal. The command keeps ignoring it.
 #[test]
 fn an_ignored_hangup_stays_ignored() {
     let temp = tempfile::tempdir().unwrap();
@@ -240,21 +240,21 @@ fn an_ignored_hangup_stays_ignored() {
     if ignores_hangups() {
         return;
     }
-    // one that is not ignored ends a run in good order
+    // without `nohup`, the signal ends a run normally
     let child = start(temp.path(), &[&SMALL[..], &["5", "--steps", "10M", "--out", "c"]].concat());
     wait_for_lines(&temp.path().join("c/progress.csv"), 3);
     signal("HUP", &child);
     assert_eq!(finish(child).status.code(), Some(130));
 }
 
-/// Whether whoever started the tests has had them ignore hangups.
+/// Whether the tests were started with hangups ignored.
 fn ignores_hangups() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
     ignored.is_some_and(|mask| u64::from_str_radix(mask.trim(), 16).is_ok_and(|mask| mask & 1 == 1))
 }
 
-/// A small run whose events need more room than its other files, with a checkpoint every few iterations.
+/// A small run whose events need more space than its other files, with a checkpoint every few iterations.
 const TINY: &str = "
 behaviors:
   Hopper:
@@ -268,7 +268,7 @@ behaviors:
     marathon: { agents: 16 }
 ";
 
-/// A row or event that could not be written comes with the iteration that is done again.
+/// A row or event that could not be written is written when the iteration is repeated.
 #[test]
 fn a_full_disk_loses_no_row_and_no_event() {
     let temp = tempfile::tempdir().unwrap();
@@ -295,7 +295,7 @@ fn a_full_disk_loses_no_row_and_no_event() {
     assert_eq!(tensors(&run.join("policy.safetensors")), tensors(&whole.join("policy.safetensors")));
 }
 
-/// Killed at any moment, a run has the policies on its way that belong to its checkpoint, and in the end those of a run
+/// A run that was killed at any moment has the intermediate policies of its checkpoint, and in the end those of a run
 /// that was never killed.
 #[test]
 fn a_kill_loses_no_policy_on_the_way() {
@@ -326,7 +326,7 @@ fn a_kill_loses_no_policy_on_the_way() {
             kept(&run)
         );
     }
-    // what a kill before the old ones are removed, or before the checkpoint, leaves
+    // the state after a kill before the old ones are removed, or before the checkpoint
     let newest = files(&run.join("policies")).pop().unwrap();
     for more in ["policy-1.safetensors", "policy-59999999.safetensors"] {
         std::fs::copy(&newest, run.join("policies").join(more)).unwrap();
@@ -367,7 +367,7 @@ fn a_policy_on_the_way_that_failed_is_written_again() {
     assert_eq!(table("a"), table("whole"));
 }
 
-/// A full disk, by a limit on the size of files.
+/// A full disk, imitated by a limit on the size of files.
 #[test]
 fn a_full_disk_stops_the_run_and_keeps_the_last_checkpoint() {
     let temp = tempfile::tempdir().unwrap();
@@ -391,14 +391,14 @@ fn a_full_disk_stops_the_run_and_keeps_the_last_checkpoint() {
     assert_eq!(tensors(&run.join("policy.safetensors")), before, "the old policy is whole");
     assert_no_leftovers(&run);
 
-    // with room again it goes on, and nothing is missing
+    // with free space it continues, and nothing is missing
     succeed(temp.path(), &["train", "--resume", "a", "--steps", "80k"]);
     let rows = timeless_rows(&run.join("progress.csv"));
     let iterations: Vec<String> = rows[1..].iter().map(|row| row[0].clone()).collect();
     assert_eq!(iterations, (1..=20).map(|i| i.to_string()).collect::<Vec<_>>());
 }
 
-/// Nobody reads what it prints: that is no reason to lose a run.
+/// A closed stdout does not end a run.
 #[test]
 fn a_closed_pipe_does_not_end_a_run() {
     let temp = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! `marathon average`: every number of the written policy is the mean of those of the policies that a run has kept. It acts for the
-//! task that the user says, and nobody has evaluated it. Policies that do not fit each other are refused by name.
+//! `marathon average`: every number of the written policy is the mean over the policies of a run. The policy is for the
+//! user's task, and has no evaluation. Policies that do not match are refused by name.
 
 mod common;
 
@@ -55,13 +55,13 @@ fn every_number_is_the_mean() {
     assert_eq!(mean.training, last.training);
     assert!(mean.evaluation.is_none());
 
-    // the same files by name; the order makes no difference but to whose description is kept
+    // the same files by name; the order only sets whose description is kept
     let named = ["average", "run/policies/policy-4096.safetensors", "run/policies/policy-8192.safetensors"];
     succeed(folder, &[&named[..], &["run/policies/policy-12288.safetensors", "--out", "named.safetensors"]].concat());
     let bytes = |name: &str| std::fs::read(folder.join(name)).unwrap();
     assert!(bytes("named.safetensors") == bytes("mean.safetensors"));
     succeed(folder, &["eval", "mean.safetensors", "--episodes", "4"]);
-    // what the run has written itself is not touched
+    // the run's own files do not change
     assert_eq!(read_json(&folder.join("run/summary.json"))["steps"], 12288);
     assert_no_leftovers(folder);
 }
@@ -117,7 +117,7 @@ fn what_has_no_mean_is_refused() {
         assert!(error.contains(expected), "{error}");
     }
     assert!(!folder.join("x.safetensors").exists());
-    // nor is the policy of a run overwritten by what is made of it
+    // the policy of a run is not overwritten by its own mean
     let error = fail(folder, 2, &["import", "run", "--out", "run/policy.safetensors"]);
     assert!(error.contains("which is also an input; expected another file"), "{error}");
     assert!(before == kept.iter().map(|path| std::fs::read(path).unwrap()).collect::<Vec<_>>());

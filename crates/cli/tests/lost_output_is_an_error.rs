@@ -1,5 +1,5 @@
-//! A result that cannot be written to stdout is an error, as one that cannot be written to a file; a reader that has seen
-//! enough is none.
+//! A result that cannot be written to stdout is an error, like one that cannot be written to a file. A reader that
+//! closes the pipe is not an error.
 
 #![cfg(target_os = "linux")]
 
@@ -34,7 +34,7 @@ fn a_full_disk_behind_stdout_is_an_error() {
         assert!(text.contains("error: stdout: write: No space left on device"), "{words}: {text}");
         assert!(!text.contains("panicked"), "{words}: {text}");
     }
-    // the file that it wrote is whole
+    // the written file is complete
     succeed(temp.path(), &["eval", "a/policy.onnx", "--episodes", "1"]);
 }
 

@@ -1,12 +1,12 @@
-//! `marathon motion` turns a recording into a checked clip in one command, draws it, makes it another character's, and says
-//! what is wrong with bad ones.
+//! `marathon motion` converts a recording to a checked clip in one command, draws it, retargets it to another
+//! character, and reports the problems of bad recordings.
 
 mod common;
 
 use common::{assert_no_leftovers, fail, json, recording, run, succeed};
 use std::path::{Path, PathBuf};
 
-/// A clip that comes with Marathon.
+/// One of Marathon's clips.
 fn shipped(name: &str) -> String {
     let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/motions").join(name);
     path.to_string_lossy().into_owned()
@@ -27,7 +27,7 @@ fn a_recording_becomes_a_checked_clip() {
     for line in ["\"name\": \"bend\"", "\"model\": \"humanoid\"", "\"license\": \"CC0-1.0\"", "\"loop\": \"none\""] {
         assert!(file.contains(line), "{line}");
     }
-    // the model is found by the clip's own word for it
+    // the clip names the model
     let report = json(&succeed(temp.path(), &["--json", "motion", "check", "bend.motion"]));
     assert_eq!(report["clips"][0]["warnings"], serde_json::json!([]));
     assert_eq!(report["clips"][0]["report"]["frames"], 39);
@@ -52,7 +52,7 @@ fn a_clip_of_one_character_becomes_one_of_another() {
     let clip = shipped("humanoid/walk.motion");
     let text = succeed(temp.path(), &["motion", "retarget", &clip, "--model", "walker2d", "--out", "walk.motion"]);
     assert!(text.starts_with("wrote walk.motion: 76 frames, 1.27 s"), "{text}");
-    // whose the recording was is not forgotten
+    // the source of the recording is kept
     let file = std::fs::read_to_string(temp.path().join("walk.motion")).unwrap();
     assert!(file.contains("DeepMimic") && file.contains("\"model\": \"walker2d\""), "{file}");
     succeed(temp.path(), &["motion", "check", "walk.motion"]);
@@ -69,7 +69,7 @@ fn a_clip_that_comes_with_marathon_has_a_name() {
     std::fs::write(temp.path().join("mine.motion"), "").unwrap();
     let text = fail(temp.path(), 1, &["motion", "check", "min.motion"]);
     assert!(text.contains("did you mean 'mine.motion'?"), "{text}");
-    // a file goes before a name
+    // a file takes precedence over a name
     std::fs::copy(shipped("marathon_man/run.motion"), temp.path().join("walk")).unwrap();
     let file = json(&succeed(temp.path(), &["--json", "motion", "check", "walk"]));
     assert_eq!(file["clips"][0]["report"]["frames"], 48);
@@ -124,7 +124,7 @@ fn errors_say_what_to_do() {
         let text = fail(temp.path(), 2, &options);
         assert!(text.contains("--balance is ") && text.contains("expected a factor from 0 to 100"), "{text}");
     }
-    // what is wrong with the options is told before a long file is read
+    // invalid options are reported before a long file is read
     let text = import("none.bvh", "humanoid", "a.json", 2);
     assert!(text.contains("--out is a.json"), "{text}");
     let text = import("none.bvh", "humanoid", "a.motion", 1);
@@ -148,7 +148,7 @@ fn a_clip_never_replaces_what_it_is_made_from() {
     assert_eq!(std::fs::read(temp.path().join("walk.motion")).unwrap(), before);
 }
 
-/// Two frames of DeepMimic's figure, and of a BVH figure.
+/// Two frames of DeepMimic's character, and of a BVH character.
 #[test]
 fn motions_too_short_to_loop_are_refused() {
     let temp = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! Names of files and folders that are not UTF-8, or hold quotes and blanks, work everywhere; in JSON, which has no other
-//! text, their odd bytes are replacement characters.
+//! Names of files and folders that are not UTF-8, or contain quotes and spaces, work everywhere. JSON shows replacement
+//! characters for their invalid bytes.
 
 #![cfg(target_os = "linux")]
 
@@ -11,7 +11,7 @@ use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// A name that is no text.
+/// A name that is not UTF-8.
 fn odd(ending: &str) -> OsString {
     OsStr::from_bytes(&[b"it's \xff ", ending.as_bytes()].concat()).into()
 }
@@ -79,7 +79,7 @@ fn every_command_takes_any_path() {
     assert_no_leftovers(path);
 }
 
-/// The command that an interrupted run prints can be pasted, whatever the folder is called.
+/// The command that an interrupted run prints can be pasted, whatever the name of the folder.
 #[test]
 fn printed_commands_can_be_pasted() {
     let temp = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! `marathon motion render --policy` and `marathon render --ghost` draw a policy together with the clip that it follows, and
-//! tell how far apart the two are.
+//! `marathon motion render --policy` and `marathon render --ghost` draw a policy together with the clip that it
+//! follows, and report the distance between them.
 
 mod common;
 
@@ -21,7 +21,7 @@ fn trained(task: &str) -> tempfile::TempDir {
     temp
 }
 
-/// What is told of a small picture, and the picture.
+/// The report of a small picture, and the picture.
 fn drawn(folder: &Path, words: &[&str]) -> (Value, Vec<u8>) {
     let small = ["--out", "x.png", "--frames", "3", "--width", "60", "--json"];
     let report = json(&succeed(folder, &[words, &small].concat()));
@@ -42,7 +42,7 @@ fn a_policy_is_drawn_with_its_clip() {
     assert_eq!(same["joint_error"], report["joint_error"], "the ghost's place changes the picture alone");
     assert_ne!(beside, inside);
 
-    // the same by the other command, without and with the ghost
+    // the same with the other command, without and with the ghost
     let play = ["render", "a", "--option", "start=first", "--seconds", "1.27"];
     let (alone, without) = drawn(path, &play);
     assert!(alone.get("joint_error").is_none() && without != inside);
@@ -56,7 +56,7 @@ fn a_film_begins_where_the_clip_does() {
     let temp = trained("MarathonMan");
     let (run, path) = (clip("run.motion"), temp.path());
     let follow = ["motion", "render", &run, "--policy", "a"];
-    // the noise of a start, up to 0.01 rad, and a decision
+    // start noise of up to 0.01 rad, and one decision
     let (report, _) = drawn(path, &[&follow[..], &["--seconds", "0.001"]].concat());
     let error = report["joint_error"].as_f64().unwrap();
     assert!((0.002..0.01).contains(&error), "{error}");
@@ -66,7 +66,7 @@ fn a_film_begins_where_the_clip_does() {
     assert!(first != elsewhere && first != walk);
 }
 
-/// The same agent in the library reports its error by itself, but for that of its start.
+/// The library reports the same agent's error, except for that of its start.
 #[test]
 fn the_error_is_the_one_that_the_task_reports() {
     let temp = trained("MarathonManRun");

@@ -1,5 +1,5 @@
-//! `marathon export` and `marathon import`: a policy that went to ONNX and came back does as it did, and `eval` takes either. A policy
-//! can be handed on for other options.
+//! `marathon export` and `marathon import`: a policy acts the same after conversion to ONNX and back, and `eval`
+//! accepts both. A policy can be converted for other options.
 
 mod common;
 
@@ -29,7 +29,7 @@ fn there_and_back() {
     assert_no_leftovers(folder);
 }
 
-/// A policy that was trained for one thing is handed on for another.
+/// A policy that was trained with some options is converted for others.
 #[test]
 fn a_policy_is_written_for_other_options() {
     let temp = tempfile::tempdir().unwrap();

@@ -1,6 +1,6 @@
-//! A run whose rollouts are played by processes has the bits of one that plays them itself, whatever their number; they
-//! leave with it. A process that dies ends the run within seconds, and the run goes on with the same bits. What cannot be
-//! played elsewhere is refused before anything is written.
+//! A run whose rollouts are played by processes has the bits of one that plays them itself, for any number of
+//! processes. The processes end with the run. If a process dies, the run ends within seconds and can be resumed with
+//! the same bits. Runs that processes cannot play are refused before anything is written.
 
 mod common;
 
@@ -16,7 +16,7 @@ fn processes_change_nothing() {
     };
     let alone = train("alone", &[]);
     assert_eq!(train("two", &["--processes", "2"]), alone);
-    // four blocks of agents: no more than four processes have work
+    // four blocks of agents: at most four processes have work
     assert_eq!(train("many", &["--processes", "9", "--threads", "2"]), alone);
 }
 
@@ -39,7 +39,7 @@ fn sac_is_refused() {
     assert!(error.contains("--processes is 2, expected 0 with sac"), "{error}");
 }
 
-/// Killed at some moment, or while the other process cannot get its answer out: both are dead processes to the learner.
+/// A process is killed at some moment, or while the other one cannot send its answer. The learner sees both as dead.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_killed_process_ends_the_run_which_goes_on_with_the_same_bits() {
@@ -90,13 +90,13 @@ fn a_killed_process_ends_the_run_which_goes_on_with_the_same_bits() {
     }
 }
 
-/// The processes that a process has started, in the order of their start.
+/// The child processes of a process, in the order of their start.
 #[cfg(target_os = "linux")]
 fn children(parent: u32) -> Vec<u32> {
     let of = |entry: std::io::Result<std::fs::DirEntry>| {
         let id: u32 = entry.ok()?.file_name().to_str()?.parse().ok()?;
         let stat = std::fs::read_to_string(format!("/proc/{id}/stat")).ok()?;
-        // the name before it may hold anything
+        // the name before it may contain anything
         let fields = stat.rsplit_once(')')?.1;
         (fields.split_whitespace().nth(1)? == parent.to_string()).then_some(id)
     };

@@ -1,4 +1,4 @@
-//! `marathon render` shows a policy as a strip or an animation and says what it wrote.
+//! `marathon render` draws a policy as a strip or an animation and reports what it wrote.
 
 mod common;
 
@@ -56,7 +56,7 @@ fn an_animation_lasts_as_long_as_asked() {
 #[test]
 fn a_fall_is_shown_and_told() {
     let temp = trained();
-    // after two iterations nobody can stand for long
+    // after two iterations the character cannot stand for long
     let args = ["render", "a", "--out", "x.gif", "--width", "64", "--seconds", "20", "--json"];
     let report = json(&succeed(temp.path(), &args));
     assert_eq!(report["falls"], 1);

@@ -124,7 +124,7 @@ fn the_policy_that_a_run_starts_from_may_not_change_before_the_first_checkpoint(
     succeed(&elsewhere, &["train", "--resume", "../here/run", "--steps", "2048"]);
 }
 
-/// The agent's name beside `--resume` does not set any arguments: the run keeps its own.
+/// The agent's name together with `--resume` does not set any options: the run keeps its own.
 #[test]
 fn a_named_agent_goes_on_with_the_arguments_of_the_run() {
     let temp = tempfile::tempdir().unwrap();

@@ -1,6 +1,6 @@
-//! `marathon eval` and `marathon render` play the run of a task with several roles with the policies of all of them, which lie
-//! side by side: the evaluation is the one at the end of the training, and the picture shows the ground that was built. A policy
-//! that is missing is named.
+//! `marathon eval` and `marathon render` play the run of a task with several roles with the policies of all of them,
+//! which lie in the same folder. The evaluation equals the one at the end of the training, and the picture shows the
+//! built ground. A missing policy is named.
 
 mod common;
 

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// A policy for a task whose arguments it may or may not accept.
+/// A policy for a task with options that the task may refuse.
 fn policy(folder: &Path, agent: &str, options: &[(&str, Value)], change: impl Fn(&mut PolicyMeta)) {
     let spec = Setting::named(agent).unwrap().factory().unwrap().spec().clone();
     let mut meta = PolicyMeta::of(&spec, vec![4], marathon_learn::Activation::Tanh);
@@ -53,7 +53,7 @@ fn arguments_beyond_measure_are_refused_by_name() {
         let text = refusal(path);
         assert!(text.contains(part), "{agent} {name}: {text}");
     }
-    // training arguments, which playing does not need
+    // training options, which playing does not need
     let text = fail(path, 1, &["train", "MarathonManSteer", "--option", "relive=1e18"]);
     assert!(text.contains("option relive") && text.contains("a number from 0 to 1"), "{text}");
     let names = vec!["walk"; 100_000].join(",");

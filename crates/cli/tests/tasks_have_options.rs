@@ -1,5 +1,6 @@
-//! A task's arguments are given once: the run, its policy in every format, its processes and its summary know them, and
-//! whoever evaluates or resumes plays the same task. A clip in a file is one of them, and goes with the run and the policy.
+//! A task's options are given once. The run, its policy in every format, its processes and its summary store them, so
+//! evaluating or resuming uses the same task. A clip in a file is one of them, and is stored with the run and the
+//! policy.
 
 mod common;
 
@@ -35,7 +36,7 @@ fn options_are_recorded_and_obeyed() {
     train(path, "a", &["clip=run", "future=1"]);
     for file in ["run.json", "summary.json"] {
         let options = read_json(&path.join("a").join(file))["options"].clone();
-        // the configuration that comes with the task says where it starts
+        // the task's default configuration sets the starts
         let expected = ("run".into(), 1.0.into(), "adaptive".into());
         assert_eq!((&options["clip"], &options["future"], &options["start"]), (&expected.0, &expected.1, &expected.2));
     }
@@ -95,7 +96,7 @@ fn a_configuration_has_options_and_the_command_line_wins() {
     assert!(!path.join("b").exists());
 }
 
-/// From the clip's beginning and from anywhere, for each clip of the task; of tasks without clips nothing.
+/// Starts at the clip's beginning and anywhere, for each clip of the task. Nothing for tasks without clips.
 #[test]
 fn a_policy_tells_how_well_it_follows_each_clip() {
     let temp = tempfile::tempdir().unwrap();
@@ -118,7 +119,7 @@ fn a_policy_tells_how_well_it_follows_each_clip() {
             assert!(number("completed") <= 16.0 && number("flips") == 0.0, "{found}");
         }
     }
-    // starts of its own are no matter
+    // the task's own starts do not matter
     assert_eq!(eval(path, &["a", "--option", "start=first"])["imitation"], of_eval);
     let text = succeed(path, &["eval", "a", "--episodes", "4"]);
     assert!(text.contains("the clip walk:\n  from its beginning"), "{text}");
@@ -185,7 +186,7 @@ fn wrong_options_are_refused_by_name_with_the_nearest() {
     assert!(text.contains("--option") && text.contains("--resume"), "{text}");
 }
 
-/// The clip is one that comes with Marathon, under another name: the policies are the same.
+/// The clip is one of Marathon's under another name: the policies are the same.
 #[test]
 fn a_clip_of_a_file_goes_with_its_run_and_its_policy() {
     let temp = tempfile::tempdir().unwrap();
@@ -204,14 +205,14 @@ fn a_clip_of_a_file_goes_with_its_run_and_its_policy() {
     assert_eq!(of_file["imitation"][0]["clip"], "mine.motion");
     of_file["imitation"][0]["clip"] = "walk".into();
     assert_eq!(of_file, of_shipped);
-    // the policy alone, too, in both formats
+    // also only the policy, in both formats
     std::fs::copy(path.join("a/policy.safetensors"), path.join("p.safetensors")).unwrap();
     assert_eq!(eval(path, &["p.safetensors"]), eval(path, &["a"]));
     succeed(path, &["export", "p.safetensors", "--out", "p.onnx"]);
     succeed(path, &["import", "p.onnx", "--out", "again.safetensors"]);
     assert_eq!(eval(path, &["again.safetensors"])["falls"], of_shipped["falls"]);
 
-    // a clip that has changed is another one
+    // a changed clip is another one
     let file = path.join("a/mine.motion");
     std::fs::write(&file, walk().replacen("0.", "0.0", 1)).unwrap();
     let text = fail(path, 1, &["train", "--resume", "a", "--steps", "1536"]);
@@ -234,7 +235,7 @@ fn a_recording_becomes_the_clip_that_import_makes_of_it() {
     let text = |file: &str| std::fs::read_to_string(path.join(file)).unwrap();
     assert_eq!(text("a/bend.motion"), text("bend.motion"));
 
-    // joints that no mapping knows: what makes a clip of it
+    // joints that no mapping knows: the message names the command that makes a clip
     let strange = "HIERARCHY\nROOT blob\n{\n OFFSET 0 0 0\n CHANNELS 3 Xposition Yposition Zposition\n End Site\n {\n  \
                    OFFSET 0 1.7 0\n }\n}\nMOTION\nFrames: 2\nFrame Time: 0.1\n0 0 0\n0 0 0\n";
     std::fs::write(path.join("blob.bvh"), strange).unwrap();

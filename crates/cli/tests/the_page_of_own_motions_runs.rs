@@ -1,6 +1,6 @@
-//! Every command of docs/own-motion.md runs as printed, on recordings of a skeleton, units and axes that do not come with
-//! Marathon, and what comes out is the motion that the recordings were made of. Only trainings are shorter, and pictures
-//! smaller; what opens a window or needs other programs is left out.
+//! Every command of docs/own-motion.md runs as printed, on recordings with another skeleton, units and axes, and the
+//! results match the motion of the recordings. Only trainings are shorter, and pictures smaller. Commands that open a
+//! window or need other programs are left out.
 
 mod common;
 #[path = "common/foreign.rs"]
@@ -87,7 +87,7 @@ fn the_commands_run_as_printed() {
     assert_eq!(found, [true; 3], "all recordings are used");
 }
 
-/// Both files were made of Marathon Man's own walk, through a skeleton with other proportions.
+/// Both files come from Marathon Man's own walk, through a skeleton with other proportions.
 #[test]
 fn a_foreign_skeleton_gives_the_motion_back() {
     let temp = tempfile::tempdir().unwrap();

@@ -1,6 +1,6 @@
-//! The README's first command makes the policy that is shipped: `train hopper`, with the default seed, gives the weights of
-//! `assets/policies/hopper.safetensors`, bit for bit. After a change of bits, `assets/policies/train.sh` trains the shipped
-//! policies again.
+//! The README's first command gives the shipped policy: `train hopper`, with the default seed, gives the weights of
+//! `assets/policies/hopper.safetensors`, bit for bit. After a change of bits, `assets/policies/train.sh` trains the
+//! shipped policies again.
 
 mod common;
 
@@ -19,7 +19,7 @@ fn training_gives_the_shipped_weights() {
         assert!(t.2 == s.2, "{} has other bits: run assets/policies/train.sh if they are meant to change", t.0);
     }
     assert_eq!(trained.len(), shipped.len());
-    // what the README prints
+    // the numbers in the README
     let eval = &read_json(&run.join("summary.json"))["eval"];
     let readme = include_str!("../../../README.md");
     let line =

@@ -1,4 +1,4 @@
-//! A run leaves every file that it promises, and what they say agrees.
+//! A run writes all documented files, and they agree with each other.
 
 mod common;
 
@@ -161,7 +161,7 @@ fn another_number_of_agents_keeps_the_buffer() {
     assert_eq!(config["algorithm"]["ppo"]["minibatches"], 5);
 }
 
-/// Numbers that tell how well a task is done, by the names that the task gives them.
+/// Metrics of the task, with the task's names.
 #[test]
 fn metrics_have_columns_and_tags() {
     let temp = tempfile::tempdir().unwrap();
@@ -170,7 +170,7 @@ fn metrics_have_columns_and_tags() {
     assert!(output.status.success(), "{}", stderr(&output));
     let text = std::fs::read_to_string(temp.path().join("a/progress.csv")).unwrap();
     let (head, row) = (text.lines().next().unwrap(), text.lines().next_back().unwrap());
-    // `forward` has a column of its own, the speed
+    // `forward` has its own column, the speed
     let metrics: Vec<_> = head.split(',').zip(row.split(',')).filter(|(name, _)| name.starts_with("metric/")).collect();
     let [("metric/speed", speed)] = metrics[..] else { panic!("{metrics:?}") };
     let speed: f64 = speed.parse().unwrap();

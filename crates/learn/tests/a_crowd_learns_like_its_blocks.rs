@@ -1,5 +1,5 @@
-//! Contract: agents that are stepped all at once ([`Lockstep`]) are learned from as if they came in blocks: the same bits,
-//! for any number of threads and over an interruption. A crowd that fails ends the run, and says why.
+//! Contract: agents that are stepped all at once ([`Lockstep`]) give the same training as agents in blocks: the same
+//! bits, for any number of threads and over an interruption. A crowd that fails ends the run with the reason.
 
 mod common;
 
@@ -88,7 +88,7 @@ fn the_same_bits_over_an_interruption() {
 fn the_same_evaluation_however_often() {
     let blocks = Blocks(registry::global().shards(TASK, Isa::best()).unwrap());
     let factory = lockstep(crowd());
-    // the factory that was trained on evaluates, too
+    // the training factory also evaluates
     let policy = train(&factory, Isa::best(), &config(2), None, &mut silent).unwrap().policy;
     for episodes in [small_config().run.agents, 5] {
         let options = EvalOptions { episodes, seed: 3, threads: 2 };

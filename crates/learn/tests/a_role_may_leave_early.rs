@@ -1,6 +1,6 @@
-//! A role whose part is over before the episode learns from its own part alone: its episodes are as long as that part, its last
-//! decision leads nowhere if it has failed, and what happens later is no concern of its values. The others learn on. Interruptions
-//! and threads show in nothing.
+//! A role that finishes before the episode learns only from its own part. Its episodes are as long as that part. A
+//! failure ends its last decision without a further value, and later events do not affect its values. The other roles
+//! keep learning. Interruptions and threads do not change the result.
 
 mod common;
 
@@ -19,14 +19,14 @@ const MODEL: &str = r#"
   <actuator><motor name="first" joint="slide"/><motor name="second" joint="slide"/></actuator>
 </mujoco>"#;
 
-/// Decisions of the first role, and of the episode.
+/// Decisions of the first role, and of the whole episode.
 const PART: usize = 10;
 const WHOLE: usize = 40;
 
-/// Two take turns. The first earns 1 for each of its decisions, the second something else later.
+/// Two roles take turns. The first earns 1 for each of its decisions, the second something else later.
 #[derive(Clone, Copy)]
 struct Relay {
-    /// Whether the first has failed when it leaves.
+    /// Whether the first role has failed when it leaves.
     fails: bool,
 }
 
@@ -100,7 +100,7 @@ fn relay(fails: bool) -> Arc<dyn ShardFactory> {
 fn config(iterations: u64) -> TrainConfig {
     TrainConfig::default().with(|c| {
         c.run.agents = 32;
-        // rollouts end in the midst of parts, and of what comes after them
+        // rollouts end within parts, and after them
         c.run.horizon = 14;
         c.run.total_steps = iterations * c.run.rollout_steps();
         c.run.threads = 1;
@@ -131,7 +131,7 @@ fn its_episodes_are_its_parts() {
 fn its_values_know_its_part_alone() {
     let output = train(&*relay(true), Isa::best(), &config(1500), None, &mut silent).unwrap();
     let last = output.last.unwrap();
-    // what is left to earn is known: 1 for each decision to come
+    // the remaining return is known: 1 for each remaining decision
     assert!(last.learned.explained_variance > 0.97, "{}", last.learned.explained_variance);
     let others = &last.others[0].1;
     assert!(others.explained_variance > 0.9, "{}", others.explained_variance);

@@ -1,5 +1,5 @@
-//! A run that a caller makes iteration by iteration is the run that `train` makes: the same numbers, policies and
-//! checkpoints. It may be left at any moment.
+//! A run that a caller steps iteration by iteration equals the run of `train`: the same numbers, policies and
+//! checkpoints. The caller may stop at any moment.
 
 mod common;
 
@@ -7,7 +7,7 @@ use common::{PuckTask, silent, small_config, small_of};
 use marathon_learn::{Control, IterationStats, Snapshot, Trainer, train};
 use marathon_physics::lanes::Isa;
 
-/// What does not depend on the time that passes.
+/// The values that do not depend on time.
 fn numbers(stats: &IterationStats) -> IterationStats {
     IterationStats { wall_seconds: 0.0, cpu_seconds: 0.0, env_share: 0.0, update_share: 0.0, ..stats.clone() }
 }
@@ -40,7 +40,7 @@ fn steps_are_those_of_train() {
     }
 }
 
-/// The other threads end with the value; one that has not begun, too.
+/// The other threads end with the value, even before the run has started.
 #[test]
 fn a_run_may_be_left() {
     let config = small_config().with(|config| config.run.threads = 3);

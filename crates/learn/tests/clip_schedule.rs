@@ -11,14 +11,14 @@ fn parameters(config: &TrainConfig, resume: Option<Checkpoint>) -> Vec<f32> {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("policy.safetensors");
     output.policy.save(&file).unwrap();
-    // the tensors alone: the header tells the configurations apart
+    // only the tensors: the headers have different configurations
     let bytes = std::fs::read(&file).unwrap();
     let header = u64::from_le_bytes(*bytes.first_chunk().unwrap()) as usize;
     bytes[8 + header..].chunks_exact(4).map(|c| f32::from_le_bytes(*c.first_chunk().unwrap())).collect()
 }
 
-/// A run of `rollouts` rollouts; the first has no update, so update `i` happens at `i / rollouts` of the way. A fast rate,
-/// so that ratios do reach the clip range.
+/// A run of `rollouts` rollouts. The first has no update, so update `i` happens at the fraction `i / rollouts`. The
+/// rate is high, so that ratios reach the clip range.
 fn config(rollouts: u64, clip: f64, final_clip: Option<f64>) -> TrainConfig {
     let base = small_config().with(|c| {
         ppo(c).lr = 1e-2;

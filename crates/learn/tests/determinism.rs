@@ -18,7 +18,7 @@ fn bits(output: &TrainOutput) -> Vec<u32> {
 
 #[test]
 fn threads_do_not_change_the_policy() {
-    // five blocks, so that threads get unequal shares and fewer groups than threads are possible
+    // five blocks: unequal shares for the threads, and fewer groups than threads are possible
     for config in [
         small_config(),
         small_config().with(|c| {

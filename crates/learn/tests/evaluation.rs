@@ -1,4 +1,4 @@
-//! Evaluation counts the episodes it promises, the same ones whatever the threads and widths.
+//! An evaluation has the requested number of episodes, the same ones for all threads and widths.
 
 mod common;
 

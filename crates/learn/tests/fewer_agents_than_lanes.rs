@@ -1,5 +1,5 @@
-//! One agent, or two, four or eight, are trained as any others: what is learned from and reported is theirs alone, though a
-//! block has sixteen lanes; and the promises of equal bits hold.
+//! One, two, four or eight agents are trained like any others. Training and reports use only their data, though a block
+//! has sixteen lanes, and the promises of equal bits hold.
 
 mod common;
 
@@ -8,7 +8,7 @@ use marathon_envs::{BLOCK, BlockStep, EnvError, Shard, ShardFactory, Spec};
 use marathon_learn::{Algorithm, Control, IterationStats, Ratio, Snapshot, TrainConfig, evaluate, train};
 use marathon_physics::lanes::Isa;
 
-/// Every agent's reward is its number, every agent's first observation and its metric too.
+/// Every agent's reward, first observation and metric are its index.
 struct Numbered(PuckTask);
 struct NumberedShard(Box<dyn Shard>, usize);
 

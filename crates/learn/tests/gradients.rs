@@ -1,4 +1,5 @@
-//! Derivatives equal finite differences, in double precision lanes, for every activation both losses of values and both ratios.
+//! Derivatives equal finite differences, in double precision lanes, for every activation, both value losses and both
+//! ratios.
 
 mod common;
 
@@ -75,7 +76,7 @@ impl Case {
         let rows = if ratio == Ratio::Joint { 1 } else { 3 };
         let row = |n, salt, scale| noise(n * BLOCK, salt).iter().map(|x| x * scale).collect::<Vec<f64>>();
         let data = (0..BLOCKS as u64).map(|b| {
-            // old log-probabilities around the new ones (about -2), so that ratios lie inside and outside the clip range
+            // old log-probabilities near the new ones (about -2), so that ratios lie inside and outside the clip range
             let log_prob = row(rows, 30 + b, 1.5).iter().map(|x| x - 1.0 / rows as f64).collect();
             [row(3, 20 + b, 1.0), log_prob, row(1, 50 + b, 2.0), row(1, 60 + b, 1.0), row(1, 80 + b, 2.0)]
         });
@@ -130,7 +131,7 @@ fn objective_gradients_equal_finite_differences() {
         let n = sums.samples;
         assert!(sums.clipped > 0.2 * n && sums.clipped < 0.8 * n, "both sides of the clip range: {sums:?}");
         let (net, m) = (case.actor.len(), case.actor.len() + 3);
-        // the entropy is not in the sums: it is a function of the log standard deviations alone
+        // the entropy is not part of the sums: it depends on the log standard deviations alone
         let policy = |p: &[f64]| {
             let entropy = Gaussian::new(&p[net..m]).entropy() / if ratio == Ratio::Joint { 1.0 } else { 3.0 };
             case.evaluate(p).0.policy - case.objective.entropy_coef * entropy * n
@@ -176,7 +177,7 @@ fn nothing_is_clipped_before_the_first_step() {
         assert!(sums.clipped == 0.0 && sums.kl.abs() < 1e-12 && (sums.policy + advantage).abs() < 1e-9, "{sums:?}");
         gradient[..m].to_vec()
     });
-    // a ratio for each action: the mean over the actions in place of the sum
+    // a ratio per action: the mean over the actions instead of the sum
     for (joint, each) in gradients[0].iter().zip(&gradients[1]) {
         assert!((joint - 3.0 * each).abs() < 1e-9 * (1.0 + joint.abs()), "{joint} {each}");
     }

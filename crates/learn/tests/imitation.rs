@@ -1,5 +1,6 @@
-//! Imitation by a discriminator: the gradient of its loss, penalty on the slope included, is PyTorch's and that of finite
-//! differences; it teaches what no reward tells; determinism and resuming stay whole; what cannot be imitated is refused.
+//! Imitation by a discriminator. The gradient of its loss, including the gradient penalty, equals PyTorch's and finite
+//! differences. It teaches a behavior without a task reward. Runs stay deterministic and resumable. Invalid
+//! demonstrations are refused.
 
 mod common;
 
@@ -59,7 +60,7 @@ fn the_gradient_with_its_penalty_equals_finite_differences() {
     }
 }
 
-/// Rows of samples, as PyTorch has them.
+/// Rows of samples in PyTorch's form.
 fn rows(blocks: &Blocks<f32>) -> Vec<Vec<f32>> {
     let lane = |i: usize| blocks.block(i / BLOCK).iter().skip(i % BLOCK).step_by(BLOCK).copied().collect();
     (0..BLOCKS * BLOCK).map(lane).collect()
@@ -98,7 +99,7 @@ fn the_gradient_with_its_penalty_is_pytorchs() {
     }
 }
 
-/// The puck's task without a reward, and with demonstrations of somebody who holds the puck at the origin.
+/// The puck's task without a reward, and with demonstrations of a controller that holds the puck at the origin.
 struct Unrewarded {
     task: PuckTask,
     demonstrations: Option<Demonstrations>,
@@ -114,7 +115,7 @@ impl Unrewarded {
     }
 }
 
-/// What a controller observes that knows where the puck should be.
+/// The observation of a controller that knows the puck's target.
 fn shown(task: &PuckTask) -> Demonstrations {
     let (mut shard, mut out) = (task.shard(0, 1, 99), BlockStep::default());
     let mut all = Demonstrations { obs_len: 6, act_len: 2, ..Demonstrations::default() };

@@ -1,4 +1,4 @@
-//! The trainer learns: a task with drift, limits and unscaled observations is solved within seconds.
+//! The trainer learns: it solves a task with drift, limits and unscaled observations within seconds.
 
 mod common;
 
@@ -9,7 +9,8 @@ use marathon_learn::{
 };
 use marathon_physics::lanes::Isa;
 
-/// Return of the best policy is about 64 (holding still at the origin) less the way there and the effort against drift.
+/// The return of the best policy is about 64: holding still at the origin, minus the way there and the effort against
+/// drift.
 fn learned(config: &TrainConfig) -> f64 {
     let task = PuckTask::new();
     let mut returns = Vec::new();
@@ -53,7 +54,7 @@ fn constant_rate_with_elu_solves_the_task() {
     );
 }
 
-/// With a rate ten times that of the paper's comparison, which takes ten times as many steps.
+/// With ten times the rate of the paper's comparison, which takes ten times as many steps.
 #[test]
 fn a2c_solves_the_task() {
     let mut a2c = A2c { lr: 3e-3, entropy_coef: Moving::still(0.0), ..Default::default() };
@@ -66,7 +67,7 @@ fn a2c_solves_the_task() {
     assert!(learned(&config) > 52.0);
 }
 
-/// With half the steps, and with the settings of OpenAI Baselines as they are.
+/// With half the steps, and with the original settings of OpenAI Baselines.
 #[test]
 fn acktr_solves_the_task_in_half_the_steps() {
     assert!(
@@ -110,7 +111,7 @@ fn observer_can_stop_and_looks_at_every_iteration() {
     assert!(last.cpu_seconds > 0.0 && last.learned.reward_terms.len() == 2);
 }
 
-/// A number that is not finite in one observation of every episode of one agent does not keep the others from learning.
+/// A non-finite number in one observation of every episode of one agent does not keep the others from learning.
 #[test]
 fn poisoned_observation_is_contained() {
     let mut task = PuckTask::new();
@@ -159,7 +160,7 @@ fn settings_that_mean_nothing_to_an_algorithm_are_refused() {
     }
 }
 
-/// Settings by name, as Python's `MarathonAgent.learn` takes them, find their sections.
+/// Settings by name, as in Python's `MarathonAgent.learn`, find their sections.
 #[test]
 fn settings_by_name_are_those_of_the_algorithm() {
     let of = |json| TrainConfig::from_settings(serde_json::from_str(json).unwrap());

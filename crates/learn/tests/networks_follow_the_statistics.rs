@@ -1,5 +1,6 @@
-//! A rollout moves the statistics that normalize observations. With `follow_statistics` the networks' first layers move with
-//! them, so that a policy does after the move what it did before; without, it does something else though nothing was learned.
+//! A rollout changes the statistics that normalize observations. With `follow_statistics`, the first layers of the
+//! networks change with them, so the policy acts as before. Without it, the policy acts differently although it learned
+//! nothing.
 
 mod common;
 
@@ -9,7 +10,7 @@ use marathon_learn::nets::mlp::Mlp;
 use marathon_learn::{Activation, Control, Init, IterationStats, Normalizer, Schedule, Snapshot, train};
 use marathon_physics::lanes::Isa;
 
-/// Actions for a row of raw observations after each of four rollouts, whose updates move no parameter by as much as a bit.
+/// Actions for a row of raw observations after each of four rollouts, whose updates change no parameter by even a bit.
 fn actions(follow_statistics: bool) -> Vec<Vec<f32>> {
     let base = small_config();
     let config = base.with(|c| {
@@ -39,7 +40,7 @@ fn furthest(a: &[f32], b: &[f32]) -> f32 {
 fn a_policy_does_what_it_did_when_the_statistics_have_moved() {
     let (followed, left) = (actions(true), actions(false));
     assert_eq!(followed.len(), 4);
-    // the first rollout's statistics are those that the weights at the start are meant for
+    // the initial weights are meant for the statistics of the first rollout
     assert_eq!(followed[0], left[0]);
     for later in 1..4 {
         assert!(furthest(&followed[later], &followed[0]) < 1e-6, "{followed:?}");
@@ -75,13 +76,13 @@ fn the_first_layer_undoes_a_move() {
         assert!(was.iter().zip(&is).all(|(a, b)| (a - b).abs() < 1e-5), "{was:?} {is:?}");
         assert!(output(&net, &old, &after, &raw).iter().zip(&was).any(|(a, b)| (a - b).abs() > 1e-2));
     }
-    // what did not move is left alone
+    // constant inputs do not change
     let mut same = old.clone();
     net.follow(&mut same, &before, &before);
     assert_eq!(same, old);
 }
 
-/// An input that never moved has the smallest deviation there is; what its weights are by then is chance.
+/// An input that never moved has the smallest possible deviation. Its weights are then arbitrary.
 #[test]
 fn an_input_that_wakes_up_is_not_blown_up() {
     let net = Mlp::new(&[2, 4, 1], Activation::Tanh);
@@ -93,7 +94,7 @@ fn an_input_that_wakes_up_is_not_blown_up() {
     for (old, new) in old[..8].chunks_exact(2).zip(new[..8].chunks_exact(2)) {
         assert_eq!((new[0], new[1]), (old[0], 2.0 * old[1]));
     }
-    // asleep it counts for what it did
+    // while constant it has no effect
     let (was, is) = (output(&net, &old, &before, &[0.3, 0.0]), output(&net, &new, &after, &[0.3, 0.0]));
     assert!((was[0] - is[0]).abs() < 1e-6, "{was:?} {is:?}");
 }
@@ -116,7 +117,7 @@ fn every_algorithm_and_number_of_threads_gives_the_same_bits() {
         let one = params(true, 1);
         assert_eq!(one, params(true, 3), "{algorithm}");
         assert_ne!(one, params(false, 1), "{algorithm}");
-        // nothing moves where nothing is normalized
+        // without normalization nothing changes
         let raw = |follow_statistics| {
             let config = base.clone().with(|c| {
                 c.statistics.follow_statistics = follow_statistics;

@@ -1,4 +1,4 @@
-//! Every network of a run starts from the configured initialization, SAC's second value network too.
+//! Every network of a run starts with the configured initialization, including SAC's second value network.
 
 mod common;
 
@@ -7,7 +7,7 @@ use marathon_learn::{BLOCK, Init, Trainer};
 use marathon_physics::lanes::Isa;
 use safetensors::SafeTensors;
 
-/// All parameters of a run with SAC that has not begun.
+/// All parameters of a SAC run before its start.
 fn parameters(initialization: Init) -> Vec<f64> {
     let config = small_of("sac").with(|config| {
         config.network.initialization = initialization;

@@ -1,5 +1,5 @@
-//! A policy that is written as ONNX and read again acts the same; bytes that are no such file are refused, never a panic.
-//! (`python/tests/test_onnx.py` compares with ONNX Runtime and reads what PyTorch and Stable-Baselines3 write.)
+//! A policy that is exported to ONNX and imported again acts the same. Invalid bytes are refused without a panic.
+//! (`python/tests/test_onnx.py` compares with ONNX Runtime and reads files by PyTorch and Stable-Baselines3.)
 
 use marathon_envs::{Spec, factory};
 use marathon_learn::{Activation, Policy, PolicyMeta};
@@ -57,7 +57,7 @@ fn a_policy_survives_the_round_trip() {
                     }
                 }
                 assert_eq!(again.log_std(), policy.log_std());
-                // without hidden layers there is no activation to be known
+                // without hidden layers the activation is unknown
                 let activation = if hidden.is_empty() { again.meta().activation } else { activation };
                 assert_eq!(again.meta(), &PolicyMeta { activation, ..policy.meta().clone() });
             }

@@ -99,7 +99,7 @@ fn shipped_policies_have_theirs() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|end| end == "safetensors") {
             let policy = Policy::load(&path).unwrap_or_else(|error| panic!("{error}"));
-            // after rewriting, it is the same policy
+            // after rewriting, the policy is the same
             assert!(Policy::from_bytes(&path, &policy.to_bytes()).unwrap() == policy, "{}", path.display());
             count += 1;
         }

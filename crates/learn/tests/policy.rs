@@ -1,4 +1,4 @@
-//! A saved policy reloads to the same actions, one row or many blocks at a time, and damaged files are refused.
+//! A saved policy reloads to the same actions, one row or many blocks at a time. Damaged files are refused.
 
 mod common;
 
@@ -64,7 +64,7 @@ fn file_says_what_it_is() {
     assert_eq!((meta.control_dt, meta.physics_dt, meta.frame_skip), (0.05, 0.025, 2));
     assert_eq!(meta.evaluation.as_ref().unwrap().episodes, 20);
     assert_eq!(meta.training.as_ref().unwrap().steps, 5760);
-    // the same policy is the same file, byte for byte
+    // the same policy gives the same file, byte for byte
     let again = dir.path().join("again.safetensors");
     loaded.save(&again).unwrap();
     assert_eq!(std::fs::read(&path).unwrap(), std::fs::read(&again).unwrap());
@@ -97,7 +97,7 @@ fn damaged_policies_never_panic() {
     for end in (0..bytes.len()).step_by(97) {
         assert!(load(&bytes[..end]).is_err(), "cut at {end}");
     }
-    // every byte of the header, changed: an error, or a policy whose numbers fit each other
+    // a change of any header byte gives an error, or a policy with consistent numbers
     for i in 0..header {
         let mut damaged = bytes.clone();
         damaged[i] ^= 1 << (i % 7);

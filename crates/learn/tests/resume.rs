@@ -1,5 +1,5 @@
-//! A run that is interrupted between any two iterations and resumed gives the bits of one that never stopped, and
-//! damaged checkpoints are refused with a reason.
+//! A run that is interrupted between any two iterations and resumed gives the bits of an uninterrupted one. Damaged
+//! checkpoints are refused with a reason.
 
 mod common;
 
@@ -16,7 +16,7 @@ fn run(config: &TrainConfig, resume: Option<Checkpoint>) -> Result<Checkpoint, E
     Ok(output.checkpoint)
 }
 
-/// The files of a checkpoint without the clocks, which no two runs share.
+/// The files of a checkpoint without the clocks, which differ between runs.
 fn contents(folder: &Path) -> (serde_json::Value, Vec<u8>) {
     let json = std::fs::read(folder.join("checkpoint.json")).unwrap();
     let mut about: serde_json::Value = serde_json::from_slice(&json).unwrap();
@@ -25,7 +25,7 @@ fn contents(folder: &Path) -> (serde_json::Value, Vec<u8>) {
         about[clock] = 0.into();
     }
     about["config"]["run"]["threads"] = 0.into();
-    // that of the clocks too
+    // including the clocks' checksum
     assert!(about["checksum"].take().is_string());
     let state = std::fs::read(folder.join(about["state"]["name"].as_str().unwrap())).unwrap();
     (about, state)
@@ -121,7 +121,7 @@ fn damaged_checkpoints_are_refused() {
     let whole = Checkpoint::load(folder).unwrap();
     let steps = whole.steps();
 
-    // what was changed after it was written
+    // changes after the file was written
     std::fs::write(&description, json.replacen("\"agents\": 80", "\"agents\": 96", 1)).unwrap();
     assert!(error().contains("checkpoint.json: checksum: found "), "{}", error());
 
@@ -176,7 +176,7 @@ fn damaged_checkpoints_are_refused() {
     assert!(error().contains("checkpoint.json: read"), "{}", error());
 }
 
-/// One bit of the description is another, as a bad disk leaves it: that is seen, or it means the same.
+/// A flipped bit in the description, as from a bad disk, is either detected or has no effect.
 #[test]
 fn a_flipped_bit_is_refused_or_changes_nothing() {
     let dir = tempfile::tempdir().unwrap();
@@ -186,7 +186,7 @@ fn a_flipped_bit_is_refused_or_changes_nothing() {
     let description = folder.join("checkpoint.json");
     let bytes = std::fs::read(&description).unwrap();
     let mut refused = 0;
-    // two bits of every byte, all eight in turn
+    // two bits of every byte, covering all eight in turn
     for (place, bit) in (0..bytes.len()).flat_map(|place| [place % 4, place % 4 + 4].map(|bit| (place, bit))) {
         let mut flipped = bytes.clone();
         flipped[place] ^= 1 << bit;
@@ -199,7 +199,7 @@ fn a_flipped_bit_is_refused_or_changes_nothing() {
     assert!(refused > bytes.len(), "{refused} of {}", 2 * bytes.len());
 }
 
-/// Numbers that lie about their own lengths are refused too, whatever the checksum says.
+/// Numbers with a wrong length are refused, too, even with a correct checksum.
 #[test]
 fn truncated_environments_are_refused() {
     struct Shrunk(PuckTask);

@@ -1,6 +1,5 @@
-//! A run whose rollouts are played elsewhere gives the bits of one that plays them itself, however many play and however
-//! often one of them is lost and replaced. A run that is given up keeps what was learned; answers that do not fit are
-//! refused.
+//! A run whose rollouts are played elsewhere gives the bits of one that plays them itself, for any number of players,
+//! even if players are lost and replaced. An abandoned run keeps what it learned. Invalid answers are refused.
 
 mod common;
 
@@ -13,16 +12,16 @@ use marathon_physics::lanes::Isa;
 
 const LIMIT: usize = 20;
 
-/// Players in this process, who answer in reverse order.
+/// Players in this process that answer in reverse order.
 struct Team {
     config: TrainConfig,
     slices: usize,
     players: Vec<Option<Player>>,
     /// Rollouts played.
     rollouts: usize,
-    /// Player and rollout: it is lost after having played.
+    /// The player that is lost, and the rollout after which it is lost.
     losses: Vec<(usize, usize)>,
-    /// The rollout before which the team gives up.
+    /// The rollout before which all players fail.
     until: usize,
 }
 
@@ -69,7 +68,7 @@ fn bits(output: &TrainOutput) -> Vec<u32> {
     numbers.chain(policy.normalizer().std()).map(|x| x.to_bits()).collect()
 }
 
-/// What does not depend on the time that passes.
+/// The values that do not depend on time.
 fn numbers(stats: Option<&IterationStats>) -> IterationStats {
     let stats = stats.unwrap().clone();
     IterationStats { wall_seconds: 0.0, cpu_seconds: 0.0, env_share: 0.0, update_share: 0.0, ..stats }
@@ -134,7 +133,7 @@ fn a_run_that_is_given_up_goes_on_anywhere() {
     assert_eq!(bits(&run(Some(&mut Team::new(&config, 3)), &config, Some(half.checkpoint))), bits(&want));
 }
 
-/// Players whose answers are spoilt by `spoil`, which gets the answers of all slices.
+/// Players whose answers are corrupted by `spoil`, which gets the answers of all slices.
 struct Spoilt<F>(Team, F);
 
 impl<F: FnMut(&mut Vec<Vec<u8>>)> Players for Spoilt<F> {
@@ -163,7 +162,7 @@ fn answers_that_do_not_fit_are_refused() {
         let mut players = Spoilt(Team::new(&config, 2), spoil);
         train_with(Some(&mut players), &task, Isa::best(), &config, None, &mut silent)
     };
-    // refused by `deliver`: the run ends with nothing learned
+    // refused by `deliver`: the run ends without learning
     for spoil in [
         &mut (|a: &mut Vec<Vec<u8>>| a[0].truncate(1000)) as &mut dyn FnMut(&mut Vec<Vec<u8>>),
         &mut |a| a.swap(0, 1),

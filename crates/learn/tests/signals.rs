@@ -1,5 +1,5 @@
-//! Rewards for novelty: their gradients equal finite differences in double precision, they fade where the networks have
-//! learned, and they leave determinism, resuming and learning whole.
+//! Rewards for novelty: their gradients equal finite differences in double precision, and they fade where the networks
+//! have learned. Runs stay deterministic and resumable, and still learn the task.
 
 mod common;
 
@@ -54,7 +54,7 @@ fn gradient_of_distillation_equals_finite_differences() {
     let params: Vec<f64> = noise(nets.count(), 3).iter().map(|x| 0.4 * x).collect();
     let mut loss = |params: &[f64], gradient: Option<&mut [f64]>| {
         nets.losses::<f64>(params, &steps, &mut space);
-        // half the squared error is kept
+        // the loss is half the squared error
         let total = (0..BLOCKS * BLOCK).map(|i| 2.0 * nets.loss(&space, i)).sum::<f64>();
         if let Some(gradient) = gradient {
             nets.gradient::<f64>(params, BLOCKS, &mut space, gradient);
@@ -113,7 +113,7 @@ fn resumed_run_has_the_bits_of_an_uninterrupted_one() {
     assert!(error.to_string().contains("checkpoint: rewards is for task, curiosity [11, 7], rnd [11, 7]"), "{error}");
 }
 
-/// The rewards of both fade while their networks learn, and the task is learned beside them.
+/// Both rewards fade while their networks learn, and the task is learned at the same time.
 #[test]
 fn novelty_fades_and_the_task_is_solved() {
     for kind in [RewardKind::Curiosity, RewardKind::Rnd] {

@@ -1,5 +1,5 @@
 //! The squashed policy of SAC: derivatives of its objective equal finite differences in double precision, and its
-//! log-probabilities are those of a density.
+//! log-probabilities belong to a density.
 
 mod common;
 

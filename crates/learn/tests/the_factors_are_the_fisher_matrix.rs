@@ -1,6 +1,6 @@
-//! The Kronecker factors are the Fisher matrix: exactly for one observation in a network of any depth, exactly for many in
-//! a network of one layer, and means over the samples otherwise; the natural gradient solves with them, and in a
-//! linear policy a step changes the distribution by the divergence that was asked for.
+//! The Kronecker factors equal the Fisher matrix: exactly for one observation in a network of any depth, and exactly
+//! for many in a network of one layer. Otherwise they are means over the samples. The natural gradient solves with
+//! them, and in a linear policy a step causes the requested divergence.
 
 mod common;
 
@@ -21,7 +21,7 @@ struct Case {
 }
 
 impl Case {
-    /// With the same observation for all agents, or different ones.
+    /// With the same observation for all agents, or with different ones.
     fn new(sizes: &[usize], same: bool) -> Self {
         let net = Mlp::new(sizes, Activation::Tanh);
         let params = noise(net.len(), 3);
@@ -37,7 +37,8 @@ impl Case {
         Self { net, params, std, input, blocks }
     }
 
-    /// The layers with factors of draws whose products are on average exactly one for the same action and zero for two.
+    /// The layers with factors of draws whose products are, on average, exactly one for the same action and zero for
+    /// two actions.
     fn layers(&self) -> Vec<Layer> {
         let mut tape = self.net.tape();
         self.net.forward(Isa::best(), &self.params, &self.input, &mut tape, self.blocks);
@@ -93,7 +94,8 @@ impl Case {
         fisher
     }
 
-    /// Largest difference between a layer's factors, multiplied out, and the exact matrix, by its largest element.
+    /// Largest difference between the product of a layer's factors and the exact matrix, relative to the matrix's
+    /// largest element.
     fn error(&self, layer: &Layer) -> f64 {
         let exact = self.fisher(layer);
         let no = layer.biases.len();
@@ -127,7 +129,7 @@ fn factors_of_many_observations_are_exact_in_one_layer() {
     let case = Case::new(&[6, 3], false);
     let error = case.error(&case.layers()[0]);
     assert!(error < 1e-5, "{error}");
-    // and only an approximation below the last of several, or this test could not fail
+    // an approximation below the last of several layers, or this test could not fail
     let deep = Case::new(&[5, 7, 6, 4], false);
     assert!(deep.layers()[..2].iter().all(|layer| deep.error(layer) > 1e-3));
 }

@@ -1,5 +1,5 @@
-//! A run with `policy_average` hands out the mean of the policies of its latest part, whatever interrupts it and however many
-//! threads it has; what it learns stays the same to the bit.
+//! A run with `policy_average` returns the mean of the policies of its last part, for any interruptions and number of
+//! threads. The learned parameters stay the same to the bit.
 
 mod common;
 
@@ -46,7 +46,7 @@ fn it_is_the_weighted_mean_of_the_policies_so_far() {
     let mut expected: Vec<f64> = Vec::new();
     for (i, (last, mean)) in last.iter().zip(&mean).enumerate() {
         let numbers_of_last = numbers(last);
-        // within the first quarter of nothing there is but the policy itself
+        // the mean over the first quarter of nothing is the policy itself
         let weight = (1.0 / (PART * (i + 1) as f64)).min(1.0);
         expected.resize(numbers_of_last.len(), 0.0);
         expected.iter_mut().zip(&numbers_of_last).for_each(|(mean, x)| *mean += weight * (f64::from(*x) - *mean));
@@ -80,7 +80,7 @@ fn interruptions_and_threads_change_nothing() {
     assert_eq!(resumed.policy, whole);
     // nothing left to do, and the same policy
     assert_eq!(run(&config(PART), Some(resumed.checkpoint.clone())).policy, whole);
-    // a run that no longer averages hands out the last policy
+    // without averaging, the run returns the last policy
     let last = run(&config(0.0), Some(resumed.checkpoint)).policy;
     assert_eq!(numbers(&last), numbers(policies(&config(0.0)).last().unwrap()));
 }

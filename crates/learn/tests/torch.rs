@@ -42,7 +42,7 @@ impl Case {
         let rows = if ratio == Ratio::Joint { 1 } else { ACT };
         let data = (0..BLOCKS as u64).map(|b| {
             let log_prob = row(rows, 30 + b, 1.0).iter().map(|x| x - 1.0 / rows as f32).collect();
-            // a mean that is far from zero, or the mean objective would be the small difference of large sums
+            // a mean far from zero: otherwise the mean objective would be the small difference of large sums
             let advantage = row(1, 50 + b, 2.0).iter().map(|x| x + 0.5).collect();
             [row(ACT, 20 + b, 1.0), log_prob, advantage, row(1, 60 + b, 1.0), row(1, 80 + b, 2.0)]
         });
@@ -60,7 +60,7 @@ impl Case {
         }
     }
 
-    /// Rows of samples, as PyTorch has them.
+    /// Rows of samples in PyTorch's form.
     fn rows(block: &[f32]) -> impl Iterator<Item = Vec<f32>> + '_ {
         (0..BLOCK).map(|lane| block.iter().skip(lane).step_by(BLOCK).copied().collect())
     }

@@ -1,7 +1,7 @@
-//! Two learners in one run: a runner that wants to stay at home, and an opponent that pushes it away. Each role has a policy,
-//! statistics and settings of its own, and random streams that do not depend on the other's: where the opponent's actions
-//! come to nothing, the runner learns to the bit what it learns alone. A role that does not decide every time goes on with
-//! its last action. Threads, widths and interruptions show in no role's bits.
+//! Two learners in one run: a runner that is rewarded for staying at home, and an opponent that pushes it away. Each
+//! role has its own policy, statistics and settings, and random streams that do not depend on the other's. If the
+//! opponent's actions have no effect, the runner learns to the bit what it learns alone. A role that skips decisions
+//! keeps its last action. Threads, widths and interruptions do not change any role's bits.
 
 mod common;
 
@@ -50,12 +50,12 @@ const PARTS: [&str; 2] = ["runner", "opponent"];
 const RUNNER: Part = Part::named(&PARTS, "runner");
 const OPPONENT: Part = Part::named(&PARTS, "opponent");
 
-/// Decisions of the runner for each of an opponent that takes its time.
+/// Decisions of the runner per decision of a slow opponent.
 const PERIOD: f64 = 4.0;
 
 #[derive(Clone, Copy, Default)]
 struct Tag {
-    /// The opponent does not decide every time.
+    /// The opponent skips decisions.
     slow: bool,
 }
 
@@ -130,7 +130,7 @@ impl Agent for Tag {
     }
 }
 
-/// How far two places are apart in the plane, m, at most 1.
+/// Distance of two positions in the plane, m, at most 1.
 #[inline(always)]
 fn distance<T: Real>(a: [T; 3], b: [T; 3]) -> T {
     let (x, y) = (a[0] - b[0], a[1] - b[1]);
@@ -143,10 +143,10 @@ fn tag(slow: bool, isa: Isa) -> Arc<dyn ShardFactory> {
     registry.shards("Tag-v0", isa).unwrap()
 }
 
-/// What becomes of the opponent's actions.
+/// Effect of the opponent's actions.
 #[derive(Clone, Copy, PartialEq)]
 enum Opponent {
-    /// They come to nothing.
+    /// No effect.
     Powerless,
     /// There is no such role.
     Absent,
@@ -237,7 +237,7 @@ fn config() -> TrainConfig {
     })
 }
 
-/// With settings of the opponent's own.
+/// With separate settings for the opponent.
 fn with_roles() -> TrainConfig {
     config().with(|c| {
         let mut own = RoleConfig::from(c.clone());
@@ -266,7 +266,7 @@ fn each_role_has_a_policy_with_its_own_settings() {
         (name.as_str(), opponents.agent.as_str(), opponents.obs, opponents.act),
         ("opponent", "Tag-v0/opponent", 8, 2)
     );
-    // it also plays where one has it all, but no task of another name, and not as another role
+    // it also plays the single-role task, but no task of another name, and not as another role
     let whole = tag(false, Isa::best()).spec().clone();
     let alone = Spec { id: "Tag-v0".into(), ..whole.of_role(&whole.roles[0]) };
     assert!(output.policy.check(&alone).is_ok() && output.policy.check(&whole.of_role(&whole.roles[0])).is_ok());
@@ -277,7 +277,7 @@ fn each_role_has_a_policy_with_its_own_settings() {
     let last = output.last.unwrap();
     let [(_, learned)] = &last.others[..] else { panic!("one other role") };
     assert_eq!((last.learned.reward_terms.len(), learned.reward_terms.len()), (1, 2));
-    // the runner's loss is the opponent's gain, but for what that pays for its distance
+    // the runner's loss is the opponent's gain, except for the opponent's cost of distance
     assert!((last.learned.reward_terms[0] + learned.reward_terms[0]).abs() < 1e-6);
     assert!(learned.reward_terms[1] < 0.0);
 }
@@ -288,7 +288,7 @@ fn an_opponent_whose_actions_come_to_nothing_changes_no_bit() {
     let beside = run(&Without::new(Opponent::Powerless), &config());
     assert_eq!(alone.policy, beside.policy.clone());
     assert_eq!(alone.others, []);
-    // a powerful one does
+    // a powerful opponent does
     assert_ne!(alone.policy.params(), run(&*tag(false, Isa::best()), &config()).policy.params());
 }
 
@@ -322,7 +322,7 @@ fn a_run_goes_on_from_its_checkpoint_with_the_same_bits() {
     }
 }
 
-/// A checkpoint of one task is not taken for one of another that has other roles.
+/// A checkpoint is refused for a task of the same name with other roles.
 #[test]
 fn a_checkpoint_without_the_role_is_refused() {
     let mut once = |_: &IterationStats, _: &Snapshot<'_>| Control::Stop;
@@ -333,7 +333,7 @@ fn a_checkpoint_without_the_role_is_refused() {
     assert_eq!(error, "checkpoint: roles but the first is for opponent, expected pusher");
 }
 
-/// While it does not decide, the actions that the environment gets are those of the last decision.
+/// While it does not decide, the environment gets the actions of the last decision.
 #[test]
 fn a_slow_role_goes_on_with_its_last_action() {
     struct Watch(Arc<dyn ShardFactory>);
@@ -357,7 +357,7 @@ fn a_slow_role_goes_on_with_its_last_action() {
             self.0.reset(block, mask, obs);
         }
         fn announce(&mut self, actions: &[f32]) {
-            // all episodes begin together, and are as long as 25 periods
+            // all episodes start together, and last 25 periods
             let fresh = self.2.is_multiple_of(PERIOD as u64);
             for (now, before) in actions.chunks(4 * BLOCK).zip(self.1.chunks(4 * BLOCK)) {
                 assert_ne!(now[..2 * BLOCK], before[..2 * BLOCK]);

@@ -1,6 +1,6 @@
-//! Each role of a task is a behavior of its own to a trainer: it has its own part of the observations, actions and rewards, and
-//! agents with numbers of their own. A role that decides now and then has infos when it does and where an episode ends; in
-//! between, its last action goes on, and its rewards are summed. All of it is compared with the task in a `VecEnv`.
+//! The trainer sees each role of a task as a behavior with its own part of the observations, actions and rewards, and
+//! its own agent numbers. A role that skips decisions has infos when it decides and when an episode ends. In between,
+//! its last action stays, and its rewards are summed. The test compares everything with the task in a `VecEnv`.
 
 mod common;
 #[path = "common/tag.rs"]
@@ -26,7 +26,7 @@ fn tags(agents: usize) -> BehaviorOptions {
     BehaviorOptions { env: "Tag-v0".into(), agents, ..Default::default() }
 }
 
-/// Lets a trainer talk with a player until one of them has enough; returns the player's log.
+/// Runs a conversation between a trainer and a player until one of them ends it. Returns the player's log.
 fn converse(
     name: &str,
     fresh_ids: bool,
@@ -35,7 +35,7 @@ fn converse(
     converse_about(tags(AGENTS), name, fresh_ids, trainer)
 }
 
-/// The same about any task.
+/// The same for any task.
 fn converse_about(
     task: BehaviorOptions,
     name: &str,
@@ -58,7 +58,7 @@ fn infos(message: &UnityMessage, name: &str) -> Vec<AgentInfo> {
     AgentInfoList::decode(&rl.agent_infos[name][..]).expect("a list").value
 }
 
-/// How many agents of a behavior wait for an action.
+/// Number of agents of a behavior that wait for an action.
 fn waiting(message: &UnityMessage, name: &str) -> usize {
     infos(message, name).iter().filter(|info| !info.done).count()
 }
@@ -67,13 +67,13 @@ fn numbers(info: &AgentInfo) -> &[f32] {
     &info.observations[0].float_data.as_ref().expect("numbers").data
 }
 
-/// Chooses something for everybody who is asked.
+/// Chooses an action for every waiting agent.
 fn anything(message: &UnityMessage, side_channel: Vec<u8>) -> UnityMessage {
     let rows = |name| vec![vec![0.3, -0.2]; waiting(message, name)];
     act(&[(RUNNER, rows(RUNNER)), (OPPONENT, rows(OPPONENT))], side_channel)
 }
 
-/// What a trainer says about an environment parameter.
+/// An environment parameter message of the trainer.
 fn parameter(name: &str, value: f32) -> Vec<u8> {
     let text = [&(name.len() as i32).to_le_bytes()[..], name.as_bytes()].concat();
     let payload = [&text[..], &0i32.to_le_bytes(), &value.to_le_bytes()].concat();
@@ -114,7 +114,7 @@ impl Truth {
         self.out.reward.fill(0.0);
     }
 
-    /// Chooses by agent and decision: the runners' rows, and those of the opponents that are asked.
+    /// Chooses by agent and decision: the rows of the runners, and those of the opponents that decide.
     fn choose(&mut self, decision: usize) -> [Vec<Vec<f32>>; 2] {
         let wave = |i: usize, a: usize| ((decision * 7 + i * 3 + a * 5) as f32).sin();
         let mut rows = [Vec::new(), Vec::new()];
@@ -138,10 +138,10 @@ impl Truth {
         self.env.decides(1, &mut self.asked).expect("a role");
     }
 
-    /// Compares what was told of both roles.
+    /// Compares the messages of both roles.
     fn check(&mut self, message: &UnityMessage) {
         for (role, name) in [RUNNER, OPPONENT].into_iter().enumerate() {
-            // home and two balls, or the balls alone
+            // home and two balls, or only the balls
             let seen = |all: &[f32], i: usize| all[9 * i + role..9 * (i + 1)].to_vec();
             let mut told = infos(message, name).into_iter();
             for i in 0..AGENTS {
@@ -183,13 +183,13 @@ fn roles_see_do_and_earn_what_is_theirs() {
         let (mut alone, mut together, mut falls, mut late) = (0, 0, 0, 0);
         for decision in 0..150 {
             if decision == 70 {
-                // in the middle of episodes: all decide, and what was earned before is forgotten
+                // a reset within episodes: all decide, and earlier rewards are dropped
                 trainer.answer(&reset(Vec::new()));
                 truth.reset(None);
             } else {
                 let [runners, opponents] = truth.choose(decision);
                 match opponents.len() {
-                    // Python leaves out a behavior that has nothing to do
+                    // Python leaves out a behavior without waiting agents
                     0 => trainer.answer(&act(&[(RUNNER, runners)], Vec::new())),
                     _ => trainer.answer(&act(&[(RUNNER, runners), (OPPONENT, opponents)], Vec::new())),
                 }
@@ -212,8 +212,8 @@ fn roles_see_do_and_earn_what_is_theirs() {
     assert!(log.contains(&format!("{OPPONENT}: agents: 5; observations: 8; actions: 2")), "{log}");
 }
 
-/// A role whose part ends before the episode is done then, with what it has seen and earned until then. It has no infos before
-/// the next episode.
+/// A role whose part ends before the episode is then done, with its observations and rewards up to that point. It has
+/// no infos before the next episode.
 #[test]
 fn a_role_that_leaves_is_done() {
     const ROLES: [&str; 3] =
@@ -307,7 +307,7 @@ fn a_role_that_is_asked_and_says_nothing_rests() {
         trainer.receive();
         for decision in 0..12 {
             let [runners, opponents] = truth.choose(decision);
-            // half of the time nobody speaks for the opponents
+            // half of the time the opponents get no actions
             let speaks = decision % 2 == 0;
             for (own, _) in truth.actions.chunks_exact_mut(4).zip(&truth.asked).filter(|(_, asked)| **asked && !speaks)
             {
@@ -350,7 +350,7 @@ fn no_two_agents_have_the_same_number() {
         trainer.greet(SEED, 2);
         trainer.answer(&reset(Vec::new()));
         let mut message = trainer.receive().expect("first observations");
-        // by behavior, the numbers of those that live, and all that ever were
+        // by behavior, the numbers of the current agents, and of all agents so far
         let mut living: BTreeMap<&str, BTreeSet<i32>> = BTreeMap::new();
         let mut all = BTreeSet::new();
         for _ in 0..80 {
@@ -383,7 +383,7 @@ fn parameters_that_would_change_the_roles_are_refused_by_name() {
         let mut asked = Vec::new();
         for decision in 0..28 {
             let said = match decision {
-                // the opponent decides more often; then its role would be lost, then the opponent
+                // the opponent decides more often; later changes would remove its role, or the opponent
                 5 => parameter("period", 2.0),
                 10 => parameter("roles", 0.0),
                 12 => [parameter("roles", f32::NAN), parameter("opponent", 0.0)].concat(),

@@ -1,6 +1,6 @@
-//! The conversation goes as Python expects: a greeting without behaviors, a question, then after every order one info per
-//! agent and one more for each whose episode ended; behaviors introduce themselves once; whatever does not fit ends it with an
-//! error that says what was found and what was expected.
+//! The conversation follows Python's expectations. An initial message without behaviors and a request come first. Each
+//! command is answered with one info per agent, and one more for each ended episode. Behaviors are described once. Any
+//! mismatch ends the conversation with an error that says what was found and expected.
 
 mod common;
 
@@ -13,7 +13,7 @@ use std::thread;
 const NAME: &str = "Hopper-v0?team=0";
 const AGENTS: usize = 5;
 
-/// Lets a trainer talk with a player of a few hoppers, whose episodes last four decisions.
+/// Runs a conversation between a trainer and a player of a few hoppers, whose episodes last four decisions.
 fn converse(fresh_ids: bool, trainer: impl FnOnce(FakeTrainer) + Send + 'static) -> Result<Vec<Turn>, PlayerError> {
     let (port, accept) = listen();
     let trainer = thread::spawn(move || trainer(accept()));
@@ -33,7 +33,7 @@ fn converse(fresh_ids: bool, trainer: impl FnOnce(FakeTrainer) + Send + 'static)
     result.map(|()| turns)
 }
 
-/// Infos of the hoppers, those of episodes that ended last, and whether the behavior introduced itself.
+/// Infos of the hoppers, those of ended episodes last, and whether the behavior was described.
 fn infos(message: &UnityMessage) -> (Vec<AgentInfo>, bool) {
     let output = message.output.as_ref().expect("an output");
     let bytes = &output.rl.as_ref().expect("infos").agent_infos[NAME];
@@ -80,7 +80,7 @@ fn orders_are_obeyed() {
                 assert_ne!(old.observations, new.observations);
             }
         }
-        // in the middle of episodes: no ends, and other starts than the first
+        // a reset within episodes: no ends, and other starts than the first
         trainer.answer(&step(NAME, AGENTS, &[0.1; 4]));
         trainer.receive().expect("a decision");
         trainer.answer(&reset(Vec::new()));
@@ -142,7 +142,7 @@ fn nonsense_in_side_channels_does_not_end_a_training() {
         trainer.greet(1, 1);
         trainer.answer(&reset(vec![1, 2, 3]));
         assert_eq!(infos(&trainer.receive().unwrap()).0.len(), AGENTS);
-        // nobody acts
+        // no actions
         let mut idle = step(NAME, 0, &[]);
         idle.input.as_mut().unwrap().rl.as_mut().unwrap().agent_actions.clear();
         trainer.answer(&idle);

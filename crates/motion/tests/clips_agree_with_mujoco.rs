@@ -1,5 +1,5 @@
-//! Bodies are where MuJoCo's `mj_kinematics` puts them in every frame of the shipped clips, and velocities are those of
-//! `mj_differentiatePos`.
+//! In every frame of the shipped clips, bodies have the poses of MuJoCo's `mj_kinematics`, and velocities equal those
+//! of `mj_differentiatePos`.
 
 mod common;
 
@@ -38,7 +38,8 @@ fn kinematics_and_velocities_are_mujocos() {
             }
             for (i, mut theirs) in (1..).zip(rows(&answer["qvel"])) {
                 if free {
-                    // MuJoCo's angular velocity is in the body's axes before the step, ours in those of the frame itself
+                    // MuJoCo's angular velocity is in the body's axes before the step, ours in those of the frame
+                    // itself
                     let turn = |i: usize| {
                         let q = clip.frame(i);
                         DQuat::from_xyzw(q[4], q[5], q[6], q[3]).normalize()

@@ -1,5 +1,5 @@
-//! A clip's positions and velocities belong together, cycles go on without a seam, edits do what they say, and files keep
-//! every bit.
+//! A clip's velocities match its positions, cycles continue without a seam, edits have their documented effect, and
+//! files keep every bit.
 
 mod common;
 
@@ -24,7 +24,7 @@ fn qvel(clip: &Clip, time: f64) -> Vec<f64> {
     out
 }
 
-/// The largest difference of two poses; quaternions that differ in sign are the same.
+/// The largest difference between two poses. Quaternions of opposite sign are equal.
 fn difference(a: &[f64], b: &[f64]) -> f64 {
     let dot: f64 = (3..7).map(|k| a[k] * b[k]).sum();
     let sign = if dot < 0.0 { -1.0 } else { 1.0 };
@@ -41,7 +41,7 @@ fn positions_and_velocities_are_those_of_the_motion_sampled() {
             let time = 0.0137 * f64::from(i) % 1.0;
             let off = difference(&qpos(&clip, time), &wave(&model, time, cycle));
             assert!(off < 5e-4, "{cycle:?} at {time}: {off}");
-            // the true velocity, by differences of the motion itself
+            // the true velocity, from differences of the motion
             let h = 1e-5;
             let (a, b) = (wave(&model, time - h, cycle), wave(&model, time + h, cycle));
             let ours = qvel(&clip, time);
@@ -84,7 +84,7 @@ fn cycles_go_on_without_a_seam_in_both_directions() {
 fn a_clip_that_ends_rests_in_its_last_frame() {
     let clip = shipped("marathon_man", "kick");
     let end = clip.duration();
-    // quaternions come out normalized, those of the file have six digits
+    // sampled quaternions are normalized, those of the file have six digits
     assert!(difference(&qpos(&clip, end + 1.0), clip.frame(clip.frames() - 1)) < 1e-6);
     assert!(difference(&qpos(&clip, -1.0), clip.frame(0)) < 1e-6);
     assert!(qvel(&clip, end + 1e-9).iter().all(|v| *v == 0.0));

@@ -1,11 +1,11 @@
-//! Readers do not panic on files that were damaged at random, and name the file in every error.
+//! Readers do not panic on randomly damaged files, and name the file in every error.
 
 mod common;
 
 use common::shipped;
 use marathon_motion::{Clip, import};
 
-/// Numbers that look random, the same ones every time (Steele, Lea and Flood, splitmix64).
+/// Reproducible pseudorandom numbers (Steele, Lea and Flood, splitmix64).
 struct Random(u64);
 
 impl Random {

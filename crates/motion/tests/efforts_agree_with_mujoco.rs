@@ -1,5 +1,5 @@
-//! Inverse dynamics is MuJoCo's `mj_inverse` wherever nothing touches, and so are momentum and center of mass; a figure thrown
-//! into the air flies freely, and one that stands is carried by the ground.
+//! Inverse dynamics equals MuJoCo's `mj_inverse` without contacts, and so do momentum and center of mass. A character
+//! thrown into the air flies freely, and the ground carries one that stands.
 
 mod common;
 
@@ -49,12 +49,12 @@ fn forces_and_momentum_are_mujocos() {
     }
 }
 
-/// A box of 2 kg that a motor of 3 N m can turn against its heavy arm, at heights of a function of time.
+/// A box of 2 kg with a heavy arm and a motor of 3 N m between them. A function of time sets its height.
 fn thrown_box(height: impl Fn(f64) -> f64) -> (Model, Clip) {
     box_with_arm(0.5, height)
 }
 
-/// The same with an arm of a length in meters.
+/// The same with the length of the arm in meters.
 fn box_with_arm(length: f64, height: impl Fn(f64) -> f64) -> (Model, Clip) {
     let xml = format!(
         "<mujoco model='box'><worldbody><body name='box'><freejoint name='root'/><geom type='box' size='.5 .5 .1' mass='2'/>\
@@ -76,7 +76,7 @@ fn a_thrown_figure_flies_and_a_floating_one_is_carried_by_nothing() {
     let [flight] = &found.flights[..] else { panic!("{:?}", found.flights) };
     assert!((flight.acceleration[2] + 9.81).abs() < 1e-6, "{flight:?}");
     assert!(flight.gained.iter().all(|gained| gained.abs() < 1e-9), "{flight:?}");
-    // one-sided differences at the ends see half of the acceleration
+    // one-sided differences at the ends give half of the acceleration
     let (model, floating) = thrown_box(|_| 2.0);
     let found = efforts("floating".as_ref(), &floating, &model).expect("efforts");
     assert!((found.missing.value - 1.0).abs() < 1e-6, "{:?}", found.missing);
@@ -103,7 +103,7 @@ fn nothing_holds_what_leans_out_beyond_its_support() {
     };
     let [within, beyond, far] = [2.4, 4.0, 6.0].map(moment);
     assert!(within < 0.01, "{within}");
-    // a sixth to a quarter of it counts as a missing force instead, which the same least squares weigh
+    // a sixth to a quarter of it counts as a missing force instead, by the weights of the same least squares
     for (found, exact) in [(beyond, 4.0 / 6.0 - 0.5), (far, 6.0 / 6.0 - 0.5)] {
         assert!(found > 0.7 * exact && found < exact, "{found} of {exact}");
     }

@@ -1,5 +1,5 @@
-//! The same motion in a `.glb` and in a BVH file gives the same clip, although the `.glb` has bones that rest in other
-//! frames, a scaled and turned node above them, and its data in binary.
+//! The same motion in a `.glb` and in a BVH file gives the same clip. The `.glb` has bones with other rest frames, a
+//! scaled and rotated node above them, and binary data.
 
 mod common;
 
@@ -62,7 +62,7 @@ const OFFSETS: [[f64; 3]; 15] = [
     [0.0, 25.0, 0.0],
 ];
 
-/// Degrees about z, x and y of each joint in a frame, and the place of the hips, cm.
+/// Degrees about z, x and y of each joint in a frame, and the position of the hips, cm.
 fn pose(frame: usize) -> ([[f64; 3]; 15], [f64; 3]) {
     let share = frame as f64 / (FRAMES - 1) as f64;
     let mut turns = [[0.0; 3]; 15];
@@ -101,13 +101,13 @@ fn bvh() -> String {
     out
 }
 
-/// A turn of each joint's own frame while it rests.
+/// A rotation of each joint's own rest frame.
 fn own_frame(joint: usize) -> DQuat {
     DQuat::from_euler(glam::EulerRot::XYZ, 0.3 * joint as f64, -0.2 * joint as f64, 0.5)
 }
 
 fn glb() -> Vec<u8> {
-    // what Blender puts above a skeleton
+    // Blender's node above a skeleton
     let armature = DQuat::from_rotation_x(-90f64.to_radians());
     let above = |i: usize| PARENTS[i].map_or(armature, own_frame);
     let numbers = |q: DQuat| q.to_array().to_vec();
@@ -147,7 +147,7 @@ fn glb() -> Vec<u8> {
     for i in 0..15 {
         let turns = (0..FRAMES).flat_map(|frame| {
             let (turns, _) = pose(frame);
-            // a turn in the axes of T-pose, seen from the joint's own frame
+            // a rotation in the axes of the T-pose, in the joint's own frame
             let local = above(i).conjugate() * turn(turns[i]) * own_frame(i);
             numbers(local)
         });
@@ -169,7 +169,7 @@ fn glb() -> Vec<u8> {
     chunks(&document, &bytes)
 }
 
-/// A `.glb` file of its two parts.
+/// A `.glb` file from its two parts.
 fn chunks(document: &serde_json::Value, bytes: &[u8]) -> Vec<u8> {
     let mut text = document.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
@@ -244,7 +244,7 @@ fn damaged_glb_files_are_read_or_refused_by_name() {
     assert!(read > 100 && refused > 500, "{read} read, {refused} refused");
 }
 
-/// A kilobyte must not ask for gigabytes: keys at both ends of an hour, and a thousand joints.
+/// A kilobyte must not allocate gigabytes: keys at both ends of an hour, and a thousand joints.
 #[test]
 fn more_than_fits_is_refused_before_it_is_made() {
     let good = glb();

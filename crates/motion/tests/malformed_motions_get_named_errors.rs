@@ -1,4 +1,4 @@
-//! Files that are not what they should be are refused with their name and the line, entry or frame, never with a panic.
+//! Invalid files are refused with their name and the line, entry or frame, without a panic.
 
 mod common;
 
@@ -327,7 +327,7 @@ fn of_mappings() {
     );
 }
 
-/// The number of a DeepMimic frame that stands still at this place.
+/// The number of a DeepMimic frame at rest at this position.
 fn one(at: usize) -> String {
     let quaternions = [4, 8, 12, 16, 21, 25, 30, 35, 39];
     (if quaternions.contains(&at) { "1" } else { "0" }).into()

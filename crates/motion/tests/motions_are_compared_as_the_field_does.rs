@@ -1,4 +1,4 @@
-//! A motion that was played is compared with its clip by numbers whose value is known beforehand.
+//! Comparison of simulated motions with their clips, with known results.
 
 use marathon_motion::{Places, Tracking};
 use marathon_physics::Model;
@@ -72,7 +72,7 @@ fn flips_are_counted_when_they_are_complete() {
     for (turns, flips) in [(0.1, 0), (0.6, 0), (1.0, 1), (-2.0, 2), (-2.6, 2)] {
         assert_eq!(tracking.flips(&turned(turns)), flips, "{turns} turns");
     }
-    // down and up again the same way is no flip as long as nobody was upside down
+    // leaning forward and back is not a flip if the pelvis was never upside down
     let rocking: Vec<Vec<f64>> = (0..100).map(|i| pose(&model, 0.0, 1.5 * libm::sin(0.3 * f64::from(i)))).collect();
     assert_eq!(tracking.flips(&rocking), 0);
 }

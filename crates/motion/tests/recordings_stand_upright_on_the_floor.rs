@@ -33,7 +33,7 @@ fn shown(animation: &Animation, frame: usize) -> (Vec<DVec3>, Vec<DQuat>) {
     (places, turned)
 }
 
-/// Mean position error of the joints, m, and mean rotation error of trunk and legs, degrees, apart from heading and
+/// Mean position error of the joints, m, and mean rotation error of trunk and legs, degrees, except for heading and
 /// start position. Arms may have another rest pose: retargeting compares their directions.
 fn off(truth: &Truth, animation: &Animation) -> (f64, f64) {
     // the model's reference pose faces +x

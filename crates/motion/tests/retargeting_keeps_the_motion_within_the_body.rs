@@ -1,4 +1,5 @@
-//! Retargeting respects limits, ground, contacts, bones and balance; the identity mapping gives the clip again; what ships is sound.
+//! Retargeting respects limits, ground, contacts, bones and balance. The identity mapping reproduces the clip. Shipped
+//! clips have no warnings.
 
 mod common;
 
@@ -108,8 +109,8 @@ fn retargeting_gives_the_same_bits_again() {
     assert_eq!(bytes(), bytes());
 }
 
-/// A recording of a figure in T-pose with Mixamo's names, in centimeters and with y up, which raises its left leg to the
-/// front, bends the knee, and lifts its right arm from the T-pose straight up.
+/// A recording of a character in T-pose with Mixamo's names, in centimeters and with y up. It raises its left leg to
+/// the front, bends the knee, and lifts its right arm from the T-pose straight up.
 fn mixamo(frames: usize) -> String {
     let limb = |names: [&str; 3], at: [f64; 3], step: [f64; 3], end: [f64; 3]| {
         let v = |v: [f64; 3]| format!("{} {} {}", v[0], v[1], v[2]);
@@ -146,7 +147,7 @@ fn mixamo(frames: usize) -> String {
     );
     for i in 0..frames {
         let share = i as f64 / (frames - 1) as f64;
-        // root; left leg: x turns the thigh forward with a negative angle, the shin back with a positive one
+        // root; left leg: a negative angle about x moves the thigh forward, a positive one the shin back
         text.push_str("0 95 0 0 0 0 ");
         text.push_str(&format!("0 {} 0 0 {} 0 0 0 0 ", -60.0 * share, 90.0 * share));
         text.push_str("0 0 0 0 0 0 0 0 0 0 0 0 ");
@@ -169,7 +170,7 @@ fn a_recording_of_another_skeleton_unit_and_pose_moves_the_same_limbs() {
             let pose = Pose::of(&model, clip.frame(frame));
             (pose.pos[body(b)] - pose.pos[body(a)]).normalize()
         };
-        // in degrees from where they should point; +x is forward
+        // in degrees from the expected direction; +x is forward
         let off = |found: DVec3, wanted: DVec3| found.angle_between(wanted.normalize()).to_degrees();
         let (last, down) = (clip.frames() - 1, DVec3::NEG_Z);
         let raised = DQuat::from_rotation_y(-60f64.to_radians()) * down;
@@ -188,7 +189,7 @@ fn a_recording_of_another_skeleton_unit_and_pose_moves_the_same_limbs() {
     }
 }
 
-/// A clip of Marathon Man again, as the law of balance makes it with a factor.
+/// A clip of Marathon Man, retargeted again with a factor on the balance law.
 fn balanced(model: &Model, clip: &Clip, factor: f64) -> (Clip, Fit) {
     let path = Path::new("clip");
     let animation = Animation::of_clip(path, model, clip).unwrap();

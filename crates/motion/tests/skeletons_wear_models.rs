@@ -1,5 +1,5 @@
-//! A skeleton that wears a model moves as the model does: one of the model's own bones exactly, one of another figure with its
-//! limbs parallel to the model's and its hips in the same place, whatever its lengths, its unit and its rest pose.
+//! A skeleton that follows a model moves like the model. The model's own bones move exactly alike. Another character's
+//! limbs stay parallel to the model's and its hips coincide, whatever its lengths, unit and rest pose.
 
 mod common;
 
@@ -14,13 +14,13 @@ fn quat(q: &[f64; 4]) -> DQuat {
     DQuat::from_xyzw(q[1], q[2], q[3], q[0])
 }
 
-/// Places of all bodies.
+/// Poses of all bodies.
 fn bodies(model: &Model, qpos: &[f64]) -> Vec<([f64; 3], [f64; 4])> {
     let pose = Pose::of(model, qpos);
     pose.pos.iter().zip(&pose.quat).map(|(at, q)| (at.to_array(), [q.w, q.x, q.y, q.z])).collect()
 }
 
-/// Places of a skeleton's joints.
+/// Positions of a skeleton's joints.
 fn joints(skeleton: &Skeleton, scale: f64, frame: &Keyframe) -> Vec<DVec3> {
     let mut poses: Vec<(DVec3, DQuat)> = Vec::new();
     for (bone, turn) in skeleton.bones.iter().zip(&frame.rotations) {
@@ -63,7 +63,7 @@ fn the_models_own_skeleton_moves_exactly_so() {
     }
 }
 
-/// A figure in centimeters and T-pose that faces -y, under the names of another maker.
+/// A character in centimeters and T-pose that faces -y, with names of another program.
 fn figure() -> Skeleton {
     let rows: [(&str, Option<usize>, [f64; 3]); 17] = [
         ("mixamorig:Hips", None, [0.0, 0.0, 0.0]),
@@ -164,7 +164,7 @@ fn a_figure_with_short_legs_is_no_giant() {
     assert!((tall(&b) / tall(&a) - 1.0).abs() < 0.25, "shoulders {} and {} m above the feet", tall(&a), tall(&b));
 }
 
-/// The skeleton of a skin that rests unturned, z up in place of glTF's y.
+/// The skeleton of a skin with unrotated rest frames, z up instead of glTF's y.
 fn skin(path: &Path) -> Skeleton {
     let gltf = gltf::Gltf::open(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let joints: Vec<gltf::Node> = gltf.skins().next().expect("a skin").joints().collect();
@@ -179,7 +179,7 @@ fn skin(path: &Path) -> Skeleton {
     Skeleton { bones: joints.iter().map(bone).collect() }
 }
 
-/// The skin that comes with Marathon has the model's limbs: its joints stay where the model's are.
+/// Marathon's own skin has the model's limbs: its joints stay at the model's.
 #[test]
 fn the_skin_of_marathon_man_fits_him() {
     let (model, path) = (model("marathon_man"), file("assets/skins/marathon_man.glb"));
@@ -209,7 +209,7 @@ fn the_skin_of_marathon_man_fits_him() {
     }
 }
 
-/// Orientation of a bone, which rests unturned.
+/// Orientation of a bone with an unrotated rest frame.
 fn turn_in_world(skeleton: &Skeleton, frame: &Keyframe, bone: usize) -> DQuat {
     let own = quat(&frame.rotations[bone]);
     skeleton.bones[bone].parent.map_or(own, |parent| turn_in_world(skeleton, frame, parent) * own)

@@ -6,14 +6,14 @@
 use marathon_physics::{Model, Sim, SimOptions};
 use std::time::{Duration, Instant};
 
-/// Time that a hostile file of one megabyte may take on a busy machine.
+/// Time limit for a hostile file of one megabyte on a busy machine.
 const LONGEST: Duration = Duration::from_secs(10);
 
 fn repeat(n: usize, one: impl Fn(usize) -> String) -> String {
     (0..n).map(one).collect()
 }
 
-/// Loads a model within the time; the error if it is refused.
+/// Loads a model within the time limit. Returns the error if it is refused.
 #[track_caller]
 fn load(name: &str, text: &str) -> Result<Model, String> {
     let start = Instant::now();
@@ -29,7 +29,7 @@ fn refused(name: &str, text: &str, expected: &str) {
     assert!(error.contains(expected), "{name}: {error}");
 }
 
-/// What the limit on memory says.
+/// The text of the memory limit.
 const MEMORY: &str = "the limit 'memory' is 2 GB; set MARATHON_LIMITS=memory=";
 
 #[test]
@@ -66,7 +66,7 @@ fn classes_are_bounded_in_depth_and_number() {
 fn reading_takes_time_in_proportion() {
     let attributes = repeat(40_000, |i| format!(" a{i}='1'"));
     refused("attributes", &format!("<mujoco{attributes}/>"), "an element has more than 500 attributes");
-    // comments and texts are no attributes
+    // comments and texts are not attributes
     let comment = "<!-- a='1' -- -->".repeat(1000);
     assert!(load("comments", &format!("<mujoco>{comment}</mujoco>")).is_ok());
 

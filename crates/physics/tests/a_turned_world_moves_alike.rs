@@ -1,9 +1,9 @@
-//! Promise: physics does not care which way is north, nor where the origin is.
+//! Promise: the physics does not depend on the heading or the origin.
 //!
-//! Every shipped model is stood a quarter turn further about the vertical, gravity too, and what floats also elsewhere on the floor.
-//! After a hundred steps with contacts it is where the model as it is would be, turned. The planar models (hopper, walker,
-//! cheetah, pendulums) are solved in three components of spatial vectors as they are, and in all six once they are
-//! turned: so this compares those two as well.
+//! Every shipped model is rotated a quarter turn about the vertical, gravity included, and floating models are also
+//! moved on the floor. After a hundred steps with contacts its state is the rotated state of the original model. The
+//! planar models (hopper, walker, cheetah, pendulums) are solved in three components of spatial vectors, and in all six
+//! once they are rotated. The test therefore also compares the two.
 
 mod common;
 
@@ -14,10 +14,10 @@ use marathon_physics::model::JointType;
 use marathon_physics::{Group, Model, Sim, SimOptions, Work};
 
 const STEPS: usize = 100;
-/// Models whose parts touch each other within these steps. MuJoCo chooses the axes of such a friction pyramid by those of the
-/// world, so only a cone without axes turns with it.
+/// Models whose bodies touch each other within these steps. MuJoCo aligns the axes of such a friction pyramid with the
+/// world, so only a cone without axes rotates with it.
 const TOUCH_THEMSELVES: [&str; 1] = ["marathon_man"];
-/// Where a floating model is put, m.
+/// Position of a floating model, m.
 const AWAY: [f64; 2] = [3.0, -2.0];
 
 /// A quarter turn about the vertical. (The friction pyramid is the same after one, not after any other.)
@@ -30,10 +30,10 @@ fn turned_quat(q: &[f64]) -> [f64; 4] {
     [h * (q[0] - q[3]), h * (q[1] - q[2]), h * (q[2] + q[1]), h * (q[3] + q[0])]
 }
 
-/// The model with its moving bodies turned; free ones are turned by their state.
+/// The model with its moving bodies rotated. Free ones are rotated by their state.
 fn turned_model(model: &Model) -> Model {
     let mut out = model.clone();
-    // one model has a breath of it along x
+    // one model has a tiny amount along x
     out.opt.gravity = turned(&out.opt.gravity);
     for body in out.bodies.iter_mut().skip(1).filter(|b| b.parent == 0) {
         body.pos = turned(&body.pos);
@@ -71,7 +71,7 @@ fn play<T: Real>(model: &Model, (qpos, qvel): (&[f64], &[f64]), steps: usize) ->
     (plain(&group.qpos), plain(&group.qvel), work.stats().contacts)
 }
 
-/// Difference between a model and its turned twin, and the number of contacts.
+/// Difference between a model and its rotated twin, and the number of contacts.
 fn difference<T: Real>(model: &Model, steps: usize) -> (f64, u64) {
     let qvel: Vec<f64> = (0..model.nv).map(|d| 0.5 * (2.3 * d as f64 + 1.0).sin()).collect();
     let (q, v, contacts) = play::<T>(model, (&model.qpos0, &qvel), steps);
@@ -102,7 +102,7 @@ fn a_turned_world_moves_alike() {
             model.opt.cone = Cone::Elliptic;
         }
         let (double, contacts) = difference::<f64>(&model, STEPS);
-        // rounding grows with every contact; a few steps of single precision tell whether anything is missing
+        // rounding errors grow with every contact; a few steps in single precision show whether anything is missing
         let (single, _) = difference::<f32>(&model, 5);
         println!("{:60} {double:.0e} {single:.0e} {contacts} contacts", path.display());
         if double > 1e-7 || single > 1e-3 {

@@ -1,10 +1,10 @@
 //! Contract: bits do not depend on threads, slots, widths or batch size.
 //!
-//! An agent's trajectory is a function of its own state and controls. Whoever shares its vector register, however many
-//! others there are, wherever it sits among them, and however many threads and lanes the machine has: the same bits.
-//! The agents of this test start apart, so that a group always holds standing, falling and lying ones, and they run for
-//! long enough to meet every branch of the solver. It holds with everything on: contacts between moving bodies, elliptic
-//! cones, terrain, equality constraints, tendons, activations, pushes, and constants and ground of each agent's own.
+//! An agent's trajectory depends only on its own state and controls. The bits stay the same for any other agents in its
+//! vector register, any number of agents, any slot, and any number of threads and lanes. The agents of this test start
+//! differently, so a group always holds standing, falling and lying ones. They run long enough to reach every branch of
+//! the solver. All features are on: contacts between moving bodies, elliptic cones, terrain, equality constraints,
+//! tendons, activations, pushes, and each agent's own constants and ground.
 
 mod common;
 
@@ -12,7 +12,7 @@ use marathon_physics::model::Solver;
 use marathon_physics::{Batch, BatchOptions, Isa, Model, Variation};
 use std::path::PathBuf;
 
-/// Starts and controls of agent number `id`, from a hash of the number alone.
+/// Start and controls of agent number `id`, from a hash of the number alone.
 fn noise(id: usize, k: usize) -> f64 {
     let mut z = (id as u64) << 32 | k as u64;
     z = z.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -82,7 +82,7 @@ fn models() -> Vec<Model> {
     // a low cap selects another solver, in which every agent and island has its own line search
     let low = capped.iter().enumerate().map(|(i, p)| {
         let mut model = load(p);
-        // piles that are pushed blow up where the solver stops too early
+        // pushed piles become non-finite if the solver stops too early
         (model.opt.iterations, model.opt.ls_iterations) = if i < 2 { (4, 8) } else { (12, 20) };
         model.opt.solver = if i == 1 { Solver::Cg } else { Solver::Newton };
         model
@@ -102,7 +102,7 @@ fn widths_batch_sizes_and_slots() {
         for n in [1, 7] {
             assert!(run(&model, &ids[..n], 1, best, 40)[..] == want[..n], "{}: {n} agents", model.name);
         }
-        // every agent in another slot, among strangers
+        // every agent in another slot, among other agents
         let mixed: Vec<usize> = (0..64).map(|i| if i % 4 == 1 { (i / 4 * 7 + 3) % 16 } else { 100 + i }).collect();
         let got = run(&model, &mixed, 1, best, 40);
         for (slot, &id) in mixed.iter().enumerate().filter(|(_, id)| **id < 16) {

@@ -1,4 +1,4 @@
-//! Contract: when an agent's state stops being finite, its last states can be dumped and replayed to the same bits.
+//! Contract: when an agent's state becomes non-finite, its last states can be saved and replayed to the same bits.
 
 mod common;
 

@@ -1,8 +1,8 @@
-//! Promise: what is pressed against a body that can only turn about its own center does not throw it.
+//! Promise: a contact with a body that can only turn about its own center does not throw the other body.
 //!
-//! Such a body has no inverse inertia against being moved, and MuJoCo makes the constraint harder than double precision
-//! resolves. Here single precision has the accelerations and velocities of double precision to 1e-2, in every lane width, and
-//! both stay near MuJoCo's next velocities.
+//! Such a body has no translational inverse inertia, and MuJoCo makes the constraint harder than double precision
+//! resolves. Here single precision has the accelerations and velocities of double precision to 1e-2, in every lane
+//! width, and both stay near MuJoCo's next velocities.
 
 mod common;
 

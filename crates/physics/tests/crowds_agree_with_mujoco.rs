@@ -1,11 +1,11 @@
-//! Contract: agents in which much touches much are MuJoCo's too, and cost what their islands cost.
+//! Contract: agents with many contacts between bodies also agree with MuJoCo, and cost as much as their islands.
 //!
-//! Beyond a number of rows between moving bodies an agent is solved by another factorization, and models with many pairs
-//! of geoms have a broad phase. A heap of crates and a crowd of little figures fall through all stages of piling up:
-//! contacts and accelerations equal MuJoCo's in double precision to 1e-8, and in single precision to its rounding. Both
-//! factorizations give the same accelerations, of every kind of row, also where one takes over from the other. Crowded
-//! agents leave the bits of those beside them alone, and have their own. The work grows in proportion with islands that
-//! do not touch.
+//! Beyond a number of rows between moving bodies an agent is solved by another factorization, and models with many
+//! pairs of geoms have a broad phase. A heap of crates and a crowd of small characters fall through all stages of
+//! piling up. Contacts and accelerations equal MuJoCo's in double precision to 1e-8, and in single precision to its
+//! rounding. Both factorizations give the same accelerations for every kind of row, also at the switch between them.
+//! Crowded agents do not change the bits of others, and their own bits do not depend on others. The work is
+//! proportional to the number of separate islands.
 
 mod common;
 
@@ -16,7 +16,7 @@ use marathon_physics::{Batch, BatchOptions, Group, Isa, Model, Readings, Sim, Si
 use serde_json::{Value, json};
 use std::fmt::Write;
 
-/// A model of our own and its text.
+/// A model of this test and its text.
 struct Scene {
     text: String,
     model: Model,
@@ -56,7 +56,7 @@ impl Scene {
         Self::new(&text)
     }
 
-    /// Figures of nine bodies on a grid so narrow that they fall over each other; their hamstrings are tendons.
+    /// Characters of nine bodies on a grid so narrow that they fall over each other. Their hamstrings are tendons.
     fn figures(rows: usize, spacing: f64) -> Self {
         let (mut bodies, mut tendons) = (String::new(), String::new());
         for i in 0..rows * rows {
@@ -99,7 +99,7 @@ impl Scene {
         ))
     }
 
-    /// Balls that rest on each other: a row of contacts with one row of three each.
+    /// Balls that rest on each other: a series of contacts with three rows each.
     fn tower(balls: usize) -> Self {
         let mut text = String::new();
         for k in 0..balls {
@@ -115,7 +115,7 @@ fn beyond(rows: usize) -> SimOptions {
     SimOptions { most_coupled_rows: Some(rows), ..Default::default() }
 }
 
-/// The model, to be solved to the end.
+/// The model, solved to convergence.
 fn exact(model: &Model) -> Model {
     let mut model = model.clone();
     model.opt.tolerance = 1e-14;
@@ -134,7 +134,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     norm(&mut a.iter().zip(b).map(|(x, y)| x - y)) / norm(&mut b.iter().copied()).max(1.0)
 }
 
-/// A state on the way of a falling scene, and what is made of it.
+/// A state of a falling scene, and its results.
 struct Moment {
     qpos: Vec<f64>,
     qvel: Vec<f64>,
@@ -144,7 +144,7 @@ struct Moment {
     crowded: bool,
 }
 
-/// Lets a scene fall and keeps every so many-th state.
+/// Simulates a falling scene and keeps every n-th state.
 fn fall(model: &Model, options: &SimOptions, steps: usize, every: usize) -> Vec<Moment> {
     let sim = Sim::<f64>::new(model, options.clone()).unwrap_or_else(|e| panic!("{e}"));
     let (mut work, mut group) = (Work::new(&sim), Group::new(&sim));
@@ -202,7 +202,7 @@ fn agrees(scene: &Scene, name: &str, steps: usize) {
     errors.sort_by(f64::total_cmp);
     let (median, worst) = (errors[errors.len() / 2], errors[errors.len() - 1]);
     println!("{name}: up to {most} contacts, single precision off by {median:.1e} (median), {worst:.1e} (largest)");
-    // contacts at a margin come and go with the rounding of positions
+    // contacts at the margin depend on the rounding of positions
     assert!(median < 1e-3, "{name}: single precision is off by {median:.1e} in the median");
 }
 
@@ -234,12 +234,12 @@ fn a_heap_comes_to_rest_in_single_precision() {
     let model = Scene::heap().model;
     let [(double, calm), (single, fastest)] = [rest::<f64>(&model, 1500), rest::<f32>(&model, 1500)];
     println!("mean heights {double} and {single}, largest velocities {calm} and {fastest}");
-    // crates may tumble off another side, and none may sink in
+    // crates may tumble in different directions, but none may sink in
     assert!((double - single).abs() < 0.03, "mean height {single}, in double precision {double}");
     assert!(calm < 0.05 && fastest < 0.05, "something still moves at {calm}, {fastest}");
 }
 
-/// Both factorizations on every state of the falling scene: in double precision to rounding.
+/// Both factorizations on every state of the falling scene, in double precision up to rounding.
 fn paths_agree(model: &Model, name: &str, start: impl Fn(usize, &mut Vec<f64>, &mut Vec<f64>), states: usize) {
     let model = exact(model);
     let sims = [0, usize::MAX].map(|rows| Sim::<f64>::new(&model, beyond(rows)).unwrap_or_else(|e| panic!("{e}")));
@@ -277,7 +277,7 @@ fn every_kind_of_row_agrees_on_both_paths() {
 
 #[test]
 fn one_factorization_takes_over_from_the_other() {
-    // contacts of balls with each other have three rows: eight of them are the most that are corrected for
+    // contacts between balls have three rows: eight contacts are the maximum for the correction
     for (balls, crowded) in [(8, false), (9, false), (10, true), (11, true)] {
         let scene = Scene::tower(balls);
         let moments = fall(&scene.model, &SimOptions::default(), 1, 1);
@@ -291,7 +291,7 @@ fn one_factorization_takes_over_from_the_other() {
     }
 }
 
-/// States of agents that are apart, lightly touching, or heaped, after so many steps, as bits.
+/// States of agents that are separate, lightly touching, or heaped, after a number of steps, as bits.
 fn bits(model: &Model, ids: &[usize], isa: Isa, steps: usize) -> (Vec<Vec<u64>>, u64) {
     let options = BatchOptions { agents: ids.len(), isa, ..Default::default() };
     let mut batch = Batch::new(model, &options).expect("supported");
@@ -299,7 +299,7 @@ fn bits(model: &Model, ids: &[usize], isa: Isa, steps: usize) -> (Vec<Vec<u64>>,
         let mut random = Uniform(*id as u64);
         let (mut qpos, mut qvel) = (model.qpos0.clone(), vec![0.0; model.nv]);
         for joint in model.joints.iter().filter(|j| j.kind == JointType::Free) {
-            // a third is as the model has it, a third is torn apart, and of a third few bodies meet
+            // a third is as in the model, a third is spread apart, and in a third few bodies touch
             let body = (joint.qpos_adr / 7) as f64;
             let apart = [0.0, 1.0, f64::from(u8::from(body > 9.0))][id % 3];
             qpos[joint.qpos_adr + 2] += 0.6 * apart * body;
@@ -335,7 +335,7 @@ fn crowded_and_other_agents_share_lanes_and_nothing_else() {
     for id in [0, 1, 2] {
         assert!(bits(&scene.model, &[id], best, 12).0[0] == want[id], "agent {id} alone");
     }
-    // heaped agents among torn ones, and the other way round
+    // heaped agents among separate ones, and the other way round
     for among in [[1, 4, 0, 7, 10, 13, 5], [0, 3, 1, 6, 9, 12, 8]] {
         let (got, _) = bits(&scene.model, &among, best, 12);
         for (slot, id) in among.iter().enumerate() {

@@ -1,8 +1,8 @@
-//! Contract: a model that was not written here either loads and agrees with MuJoCo, or is refused by name.
+//! Contract: a model from another project either loads and agrees with MuJoCo, or is refused by name.
 //!
-//! Tried are all model files of the Python packages of `tests/oracle` (dm_control, Gymnasium, MuJoCo, MJX, MuJoCo Warp,
-//! Brax and others). None may panic, and none may load and move differently: on random states, contacts of all kinds
-//! included, the acceleration, the constraint forces, the number of contacts, the sensors and the next state equal
+//! The test covers all model files of the Python packages of `tests/oracle` (dm_control, Gymnasium, MuJoCo, MJX, MuJoCo
+//! Warp, Brax and others). None may panic, or load and move differently. On random states, including contacts of all
+//! kinds, the acceleration, the constraint forces, the number of contacts, the sensors and the next state equal
 //! MuJoCo's to 1e-8 in double precision. A refusal names the file or the model, and the element or the feature.
 //!
 //! Every model runs under its own solver settings. If they stop MuJoCo's iteration before it converges, the test
@@ -10,8 +10,8 @@
 //! tolerance. The accelerations then agree within that tolerance, and everything agrees to 1e-8 when both sides solve
 //! to the end.
 //!
-//! `MARATHON_MODELS=FOLDER` tries the models of a folder instead. `docs/models.md` lists what became of each file. The test fails if the list is out of date; run it with
-//! `MARATHON_BLESS=1` to write it anew.
+//! `MARATHON_MODELS=FOLDER` tests the models of a folder instead. `docs/models.md` lists the result of each file. The
+//! test fails if the list is out of date; run it with `MARATHON_BLESS=1` to update the list.
 
 mod common;
 
@@ -30,17 +30,17 @@ use std::path::{Path, PathBuf};
 const STATES: usize = 20;
 /// Largest relative error.
 const BOUND: f64 = 1e-8;
-/// Models that MuJoCo loads and that move: the promise.
+/// Models that MuJoCo loads and that move: the subject of the contract.
 const AT_LEAST: usize = 100;
 
-/// A file, as `foreign_models.py` lists it.
+/// A file in the list of `foreign_models.py`.
 #[derive(Deserialize)]
 struct File {
     id: String,
     path: PathBuf,
     /// Another file with the same text.
     same_as: Option<String>,
-    /// Why MuJoCo does not load it.
+    /// Reason why MuJoCo does not load it.
     error: Option<String>,
     /// MuJoCo warns about its reference configuration.
     warns: bool,
@@ -52,7 +52,7 @@ struct File {
     nu: usize,
 }
 
-/// A state and what MuJoCo makes of it.
+/// A state, and MuJoCo's results for it.
 #[derive(Deserialize)]
 struct State {
     qpos: Vec<f64>,
@@ -62,7 +62,7 @@ struct State {
     qacc: Vec<f64>,
     qfrc_constraint: Vec<f64>,
     ncon: usize,
-    /// Nothing where rounding decides.
+    /// `None` where rounding decides.
     sensordata: Vec<Option<f64>>,
     next_qpos: Vec<f64>,
     next_qvel: Vec<f64>,
@@ -72,7 +72,7 @@ struct State {
     iterations: usize,
 }
 
-/// What `foreign_models.py` says about a model.
+/// Results of `foreign_models.py` for a model.
 #[derive(Deserialize)]
 struct Answer {
     states: Vec<State>,
@@ -80,34 +80,34 @@ struct Answer {
     skipped: usize,
 }
 
-/// What became of a file.
+/// Result of a file.
 enum Outcome {
     Loads(Box<Loaded>),
     Refused(Refusal),
 }
 
-/// A model under its own settings. It is solved to the end if they let the solver converge.
+/// A model under its own settings. It is solved to convergence if they let the solver converge.
 struct Loaded {
     own: Sim<f64>,
     to_the_end: Option<Sim<f64>>,
 }
 
-/// Why a model was refused.
+/// Reason why a model was refused.
 struct Refusal {
-    /// In the table's words.
+    /// The reason in the table's words.
     why: String,
-    /// What is missing in the error for a user to find the place.
+    /// Information that the error lacks for the user to find the place.
     vague: Option<&'static str>,
-    /// The model is said to be faulty, not to need what Marathon does not have.
+    /// Whether the error says that the model is faulty, instead of needing an unsupported feature.
     faulty: bool,
 }
 
-/// How far a loaded model is from MuJoCo.
+/// Differences of a loaded model from MuJoCo.
 #[derive(Default)]
 struct Agreement {
     /// Largest error of each quantity.
     errors: BTreeMap<String, f64>,
-    /// States with another number of contacts.
+    /// States with a different number of contacts.
     contacts: usize,
     /// Largest difference under the file's own settings, relative to the difference that its tolerance allows.
     in_tolerances: f64,
@@ -237,10 +237,10 @@ fn compare(loaded: &Loaded, states: &[State]) -> Agreement {
     out
 }
 
-/// A line of the table: what is the same everywhere, and what was measured.
+/// A line of the table: a part that is the same everywhere, and measurements.
 struct Row {
     package: String,
-    /// Counted under this heading.
+    /// The heading that counts it.
     verdict: &'static str,
     fixed: String,
     measured: String,
@@ -313,7 +313,7 @@ The loader refuses a model with the message shown, before anything is simulated.
 
 ";
 
-/// The table without what was measured.
+/// The table without measurements.
 fn without_measurements(text: &str) -> Vec<String> {
     let cut = |line: &str| {
         let cells: Vec<&str> = line.split(" | ").collect();
@@ -332,7 +332,7 @@ fn foreign_models_agree_or_are_refused() {
     let others = std::env::var_os("MARATHON_MODELS").is_some();
     assert!(others || tried >= AT_LEAST, "only {tried} foreign models were found: run ./test.sh, which installs them");
 
-    // whatever is read, nothing panics
+    // no input causes a panic
     let mut failures = Vec::new();
     let mut load = |file: &File| {
         let outcome = catch_unwind(AssertUnwindSafe(|| load(&file.path)));
@@ -414,12 +414,12 @@ fn foreign_models_agree_or_are_refused() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-/// A seed that belongs to a file, whichever others there are (FNV-1a).
+/// A seed for a file that does not depend on other files (FNV-1a).
 fn seed(id: &str) -> u32 {
     id.bytes().fold(0x811c_9dc5, |h, b| (h ^ u32::from(b)).wrapping_mul(0x0100_0193))
 }
 
-/// How a model agrees: under which cap, and whether MuJoCo's solver stops before the minimum.
+/// Agreement of a model: its cap, and whether MuJoCo's solver stops before the minimum.
 fn agrees(model: &Model) -> String {
     let name = match model.opt.solver {
         Solver::Newton => "",
@@ -434,7 +434,7 @@ fn agrees(model: &Model) -> String {
     }
 }
 
-/// What is wrong with a loaded model, if anything is.
+/// The problem of a loaded model, if any.
 fn disagreement(id: &str, model: &Model, a: &Agreement) -> Option<String> {
     let mut wrong = Vec::new();
     if a.contacts > 0 {
@@ -452,7 +452,7 @@ fn disagreement(id: &str, model: &Model, a: &Agreement) -> Option<String> {
     (!wrong.is_empty()).then(|| format!("{id}: disagrees with MuJoCo: {}", wrong.join(", ")))
 }
 
-/// Compares `docs/models.md` with what it should be, or writes it.
+/// Compares `docs/models.md` with the expected text, or writes it.
 fn check_document(text: &str, failures: &mut Vec<String>) {
     let path = common::workspace().join("docs/models.md");
     if std::env::var_os("MARATHON_BLESS").is_some_and(|v| v == "1") {

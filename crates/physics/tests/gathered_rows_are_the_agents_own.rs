@@ -1,5 +1,5 @@
-//! Contract: what [`Batch::gather`] writes of all agents is what is read of each by itself, whatever the number of
-//! threads and the width of the lanes, and contacts are those of the last step.
+//! Contract: the output of [`Batch::gather`] for all agents equals the readings of each agent, for any number of
+//! threads and any lane width. Contacts are those of the last step.
 
 mod common;
 
@@ -81,7 +81,7 @@ fn they_do_not_depend_on_threads_widths_or_what_else_is_read() {
     }
 }
 
-/// A hopper falls on its foot: the foot touches, which is forgotten when the agent is put somewhere else.
+/// A hopper lands on its foot: the foot touches, and resetting the agent clears that.
 #[test]
 fn contacts_are_those_of_the_last_step() {
     let model = model("assets/agents/hopper.xml");
@@ -108,7 +108,7 @@ fn contacts_are_those_of_the_last_step() {
             assert_eq!(after[row], expected, "agent {agent}");
         }
     }
-    // a state of another model is known as one
+    // a state of another model is detected
     let humanoid = self::model("assets/agents/humanoid.xml");
     assert!(batch.agent_state(0).fits(&model) && !batch.agent_state(0).fits(&humanoid));
 }

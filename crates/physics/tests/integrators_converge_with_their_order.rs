@@ -1,7 +1,7 @@
-//! Promise: half the time step, half the error with Euler and implicitfast, a sixteenth of it with Runge-Kutta.
+//! Promise: half the time step gives half the error with Euler and implicitfast, and a sixteenth with Runge-Kutta.
 //!
-//! On smooth motion: a chain of every kind of joint on a tumbling body, with springs, dampers, motors with activations and a
-//! medium, and a free top. The truth is Runge-Kutta with a far smaller step.
+//! The motions are smooth: a chain of every kind of joint on a tumbling body, with springs, dampers, motors with
+//! activations and a medium, and a free top. The reference is Runge-Kutta with a far smaller step.
 
 mod common;
 
@@ -47,7 +47,7 @@ fn play(integrator: Integrator, step: f64) -> Vec<f64> {
 #[test]
 fn integrators_converge_with_their_order() {
     for (integrator, order) in [(Integrator::Euler, 1.0), (Integrator::ImplicitFast, 1.0), (Integrator::Rk4, 4.0)] {
-        // implicitfast knows no medium: it has a truth of its own, its own limit, to the order that it has
+        // implicitfast does not support a medium: its reference is its own limit, extrapolated by its order
         let steps = if integrator == Integrator::Rk4 { [0.02, 0.01, 0.005] } else { [0.002, 0.001, 0.0005] };
         let truth = match integrator {
             Integrator::ImplicitFast => {

@@ -40,7 +40,7 @@ struct State {
     next_qpos: Vec<f64>,
     next_qvel: Vec<f64>,
     iterations: usize,
-    /// Whether MuJoCo's answer is independent of rounding.
+    /// Whether MuJoCo's result is independent of rounding.
     settled: bool,
 }
 
@@ -113,8 +113,8 @@ fn compare(models: &[&str], settings: &[String]) {
     compare_jobs(jobs, &names, 0.1);
 }
 
-/// Like the test above, for given jobs. In this share of the states, MuJoCo's answer may depend on rounding; these
-/// states are left out.
+/// Like the test above, for given jobs. MuJoCo's result may depend on rounding in the fraction `most_unsettled` of the
+/// states. These are left out.
 fn compare_jobs(jobs: Vec<Value>, names: &[String], most_unsettled: f64) {
     let answers = common::oracle("low_caps.py", &Value::Array(jobs.clone()));
     let (mut wrong, mut worst, mut single_worst) = (Vec::new(), 0.0_f64, Vec::new());

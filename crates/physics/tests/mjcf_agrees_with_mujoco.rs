@@ -1,9 +1,9 @@
 //! A compiled model is MuJoCo's compiled model.
 //!
-//! Whatever the file, the loader accepts it and every number of the model equals MuJoCo's to 1e-9 relative: frames,
-//! masses, inertias, inverse weights, joints, geoms, sites, height fields, tendons, equality constraints, cameras, lights,
-//! actuators, sensors, keyframes, contact pairs, options and statistics. The files are Marathon's agents, the models that
-//! come with dm_control and Gymnasium, Marathon's own files of both, and one small model per feature of the format in
+//! The loader accepts every file, and every number of the model equals MuJoCo's to 1e-9 relative: frames, masses,
+//! inertias, inverse weights, joints, geoms, sites, height fields, tendons, equality constraints, cameras, lights,
+//! actuators, sensors, keyframes, contact pairs, options and statistics. The files are Marathon's agents, the models of
+//! dm_control and Gymnasium, Marathon's own files of both, and one small model per feature of the format in
 //! `models/mjcf`. Colors and elevations are single precision in MuJoCo and agree to 1e-6.
 
 mod common;
@@ -15,7 +15,7 @@ use marathon_physics::mjcf::MjcfErrorKind;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// XML files of a folder, in order; none if there is no such folder.
+/// XML files of a folder, in order. Empty if there is no such folder.
 fn xml_files(folder: &Path) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
     let mut files: Vec<PathBuf> = entries.map(|e| e.expect("a folder entry").path()).collect();
@@ -24,7 +24,7 @@ fn xml_files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Compiles every file on both sides and collects what differs.
+/// Compiles every file on both sides and collects the differences.
 fn compare(files: &[PathBuf]) {
     assert!(!files.is_empty(), "no model files");
     let answers = oracle("compiled_model.py", &json!({ "files": files }));
@@ -122,7 +122,8 @@ fn gymnasium_mujoco() {
     compare(&names.map(|name| folder.join(format!("{name}.xml"))));
 }
 
-/// Marathon's own files of Gymnasium's models are Gymnasium's models: all that the physics and the tasks know of them.
+/// Marathon's own files of Gymnasium's models equal Gymnasium's models in everything that the physics and the tasks
+/// use.
 #[test]
 fn gymnasiums_models_written_anew() {
     let installed = package("gymnasium").join("envs/mujoco/assets");
@@ -135,7 +136,7 @@ fn gymnasiums_models_written_anew() {
     compare_but_looks(&own, &own.iter().map(original).collect::<Vec<_>>(), &[]);
 }
 
-/// The same of dm_control's, except for sensors and their sites that no task reads.
+/// The same for dm_control's, except for sensors and their sites that no task reads.
 #[test]
 fn dm_controls_models_written_anew() {
     let installed = package("dm_control").join("suite");
@@ -156,7 +157,7 @@ fn compare_but_looks(own: &[PathBuf], originals: &[PathBuf], unread: &[&str]) {
         let model = Model::from_xml_file(file).unwrap_or_else(|e| panic!("{e}"));
         let mut theirs = theirs.clone();
         forget_looks(&mut theirs);
-        // Gymnasium's humanoids name PGS, and every solver with an ordinary cap is Newton's method here
+        // Gymnasium's humanoids set PGS, and every solver with an ordinary cap is Newton's method here
         theirs["opt"]["solver"] = Value::Null;
         for field in unread {
             theirs[*field] = Value::Null;
@@ -167,13 +168,14 @@ fn compare_but_looks(own: &[PathBuf], originals: &[PathBuf], unread: &[&str]) {
     }
 }
 
-/// Makes `null`, which is not compared, of how a model looks, of what its tasks do not use, and of missing names.
+/// Replaces values by `null`, which is not compared: the look of a model, fields that its tasks do not use, and missing
+/// names.
 fn forget_looks(model: &mut Value) {
     const LOOKS: [&str; 8] = ["rgba", "material", "cameras", "lights", "keyframes", "numerics", "extent", "center"];
     match model {
         Value::Array(list) => list.iter_mut().for_each(forget_looks),
         Value::Object(fields) => {
-            // which part of an infinite plane is drawn
+            // the visible part of an infinite plane
             let plane = fields.get("kind").is_some_and(|kind| kind == "Plane");
             for (name, value) in fields {
                 let nameless = name == "name" && value == "";
@@ -227,7 +229,7 @@ fn tensor(quat: &[f64], inertia: &[f64]) -> [f64; 9] {
     std::array::from_fn(|n| (0..3).map(|k| r[n / 3][k] * inertia[k] * r[n % 3][k]).sum())
 }
 
-/// An actuator keeps of the defaults of its classes what MuJoCo keeps, those of actuators that are not supported included.
+/// An actuator keeps the class defaults that MuJoCo keeps, including those of unsupported actuators.
 #[test]
 fn actuators_over_defaults_of_any_kind() {
     const DEFAULTS: [&str; 21] = [

@@ -1,7 +1,7 @@
 //! A mistake in a model file is reported with its file, line, element and attribute, and with the nearest valid name.
 //!
-//! What would change the dynamics and is not supported is refused in the same way; nothing is skipped silently. Each row
-//! below is a model with one mistake and what the message must contain.
+//! Unsupported elements that would change the dynamics are refused in the same way. Nothing is skipped silently. Each
+//! row below is a model with one mistake, and the required parts of the message.
 
 use marathon_physics::Model;
 use marathon_physics::mjcf::MjcfErrorKind;
@@ -93,7 +93,7 @@ fn numbers_must_be_numbers_and_as_many_as_needed() {
     check("<mujoco><option timestep='-1'/></mujoco>", &["expected a number greater than zero"]);
     check("<mujoco><compiler eulerseq='xyw'/></mujoco>", &["'eulerseq' is 'xyw'; expected three letters"]);
     check("<mujoco><statistic extent='0'/></mujoco>", &["'extent' is '0'; expected a number greater than zero"]);
-    // a mistake in a class is found although nothing uses the class
+    // a mistake in a class is found even if no element uses the class
     check("<mujoco><default>\n<joint axis='1 2'/></default></mujoco>", &["bad.xml:2:", "expected 3 numbers"]);
     check("<mujoco><default>\n<geom solref='a'/></default></mujoco>", &["bad.xml:2:", "expected up to 2 numbers"]);
     check("<mujoco><default><motor gear='a'/></default></mujoco>", &["expected up to 6 numbers"]);
@@ -203,7 +203,7 @@ fn what_is_not_supported_is_refused_by_name() {
     assert!(matches!(error.kind, MjcfErrorKind::Unsupported { attribute: None, .. }));
 }
 
-/// What only matters together with something else is refused where that is there.
+/// Settings that only matter together with others are refused where those are present.
 #[test]
 fn what_is_not_supported_together() {
     let string = "<tendon><spatial name='t'><site site='s'/><site site='s'/></spatial></tendon>";
@@ -405,7 +405,7 @@ fn includes() {
     check("<mujoco><include/></mujoco>", &["the attribute 'file' is missing"]);
 }
 
-/// A device or a pipe may never end; nobody waits for it.
+/// A device or a pipe may never end, so it is not read.
 #[cfg(unix)]
 #[test]
 fn what_is_no_file_is_not_read() {
@@ -438,7 +438,7 @@ fn what_is_no_file_is_not_read() {
     std::fs::remove_dir_all(folder).unwrap();
 }
 
-/// A default that is not supported is refused where an element uses it, and only there.
+/// An unsupported default is refused where an element uses it, and only there.
 #[test]
 fn unsupported_defaults_are_refused_where_they_are_used() {
     let with = |default: &str, body: &str, rest: &str| {
@@ -482,7 +482,7 @@ fn unsupported_defaults_are_refused_where_they_are_used() {
     check(&with("<general inptu='pos'/>", "", ""), &["did you mean 'input'?"]);
     check(&with("", "", "<actuator><general joint='j' input='poss'/></actuator>"), &["did you mean 'pos'?"]);
     check(&with("", "", "<actuator><general joint='j' input='pos vel'/></actuator>"), &["only one input is supported"]);
-    // plugins that are declared and not used
+    // plugins that are declared but not used
     let declared =
         with("", "", "").replace("<default>", "<extension><plugin plugin='mujoco.pid'/></extension><default>");
     assert!(Model::from_xml_str(&declared, "declared.xml").is_ok());

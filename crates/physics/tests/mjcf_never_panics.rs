@@ -1,13 +1,13 @@
-//! The loader never panics: any bytes and any damage to a valid file end in a model or in an error.
+//! The loader never panics: any bytes and any damage to a valid file lead to a model or an error.
 //!
-//! A model that comes out is sound: lengths agree, indices are in range, and every number is finite.
+//! A loaded model is valid: lengths agree, indices are in range, and every number is finite.
 
 use marathon_physics::Model;
 use marathon_physics::model::{EqualityKind, TendonKind, Transmission};
 use proptest::prelude::*;
 use std::path::Path;
 
-/// The models of `models/mjcf`, the valid files that are damaged here.
+/// The valid files that are damaged here: the models of `models/mjcf`.
 fn corpus() -> Vec<String> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/models/mjcf");
     let mut files: Vec<_> = std::fs::read_dir(folder).expect("the models").map(|e| e.expect("a file").path()).collect();
@@ -15,7 +15,7 @@ fn corpus() -> Vec<String> {
     files.iter().map(|f| std::fs::read_to_string(f).expect("a model")).collect()
 }
 
-/// Loads the text and checks what comes out.
+/// Loads the text and checks the result.
 fn load(text: &str) -> Result<(), TestCaseError> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/models/mjcf");
     let read = |name: &str| std::fs::read(folder.join(name)).map_err(|e| e.to_string());
@@ -80,7 +80,7 @@ fn load(text: &str) -> Result<(), TestCaseError> {
     Ok(())
 }
 
-/// Pieces that MJCF is made of, to be strung together at random.
+/// Pieces of MJCF that are combined at random.
 const PIECES: [&str; 52] = [
     "<mujoco>",
     "</mujoco>",
@@ -136,7 +136,7 @@ const PIECES: [&str; 52] = [
     "]]>",
 ];
 
-/// Numbers at the edges of what a number can be.
+/// Numbers at the limits of the number formats.
 const NUMBERS: [&str; 14] =
     ["0", "-1", "1e308", "-1e308", "1e-308", "1e-15", "1e155", "nan", "inf", "", "99999999999", "1 2", "0x10", "1e400"];
 
@@ -176,7 +176,7 @@ proptest! {
         load(&String::from_utf8_lossy(&bytes))?;
     }
 
-    /// Replaces whole attribute values, which gets past the XML parser.
+    /// Replaces whole attribute values, which passes the XML parser.
     #[test]
     fn damaged_values(
         which in any::<prop::sample::Index>(),

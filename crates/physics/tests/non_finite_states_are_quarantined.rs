@@ -1,4 +1,4 @@
-//! A state that stops being finite is caught at its own agent: counted, reset, reported, and nobody else notices.
+//! A state that becomes non-finite is handled at its own agent: counted, reset, reported, without any effect on others.
 
 mod common;
 
@@ -51,7 +51,7 @@ fn an_agent_too_far_away_is_broken_in_every_lane_width() {
         let sim = SimOptions { ground_contacts_only: true, ..Default::default() };
         let mut batch = Batch::new(&model, &BatchOptions { agents: 16, isa, sim, ..Default::default() }).unwrap();
         let mut qpos = model.qpos0.clone();
-        // finite, but its square is not: alone it would hover there, beside others that touch the ground it would not
+        // finite, but its square is not: the result would depend on whether another agent touches the ground
         qpos[1] = 3e38;
         batch.reset(3, &qpos, &vec![0.0; model.nv]);
         assert_eq!(batch.step(&vec![0.0; 16 * model.nu], 1), [3], "{}", isa.name());

@@ -1,10 +1,11 @@
 //! Contract: the physics agrees with MuJoCo.
 //!
-//! On random states of every shipped model and of models that were not written here (dm_control, Gymnasium), the mass
-//! matrix, the bias, passive and actuator forces, the contacts, the constraint forces, the acceleration, the sensors and
-//! the next state equal those of the `mujoco` package: to 1e-9 in double precision, and in single precision to the
-//! rounding of its arithmetic, in every lane width that the processor has. So do, to 1e-8, contacts between moving bodies
-//! and with terrain, elliptic cones, equality constraints, tendons, actuator dynamics, media and pushes.
+//! The test uses random states of every shipped model and of models from other projects (dm_control, Gymnasium). The
+//! mass matrix, the bias, passive and actuator forces, the contacts, the constraint forces, the acceleration, the
+//! sensors and the next state equal those of the `mujoco` package. In double precision they agree to 1e-9, and in
+//! single precision to the rounding of its arithmetic, in every lane width of the processor. The same holds to 1e-8 for
+//! contacts between moving bodies and with terrain, elliptic cones, equality constraints, tendons, actuator dynamics,
+//! media and pushes.
 
 mod common;
 
@@ -35,7 +36,7 @@ fn models() -> Vec<PathBuf> {
     }
     paths.extend(["hopper", "walker", "humanoid", "cheetah"].map(|n| suite.join(format!("{n}.xml"))));
     paths.extend(["hopper", "walker2d_v5", "half_cheetah", "ant", "humanoid"].map(|n| gym.join(format!("{n}.xml"))));
-    // a place is a seed: newer models stand last, so that the others keep their states
+    // the position sets the seed: new models come last, so that the others keep their states
     paths.sort_by_key(|path| path.ends_with("marathon_man.xml"));
     paths
 }
@@ -47,7 +48,7 @@ impl Errors {
     fn add(&mut self, got: &[f64], want: &[f64]) {
         self.0.push(distance(got, want, 1e-9));
     }
-    /// Forces below 1 N (N m) count absolutely: a limit violated by a rounding error pushes with nearly nothing.
+    /// Forces below 1 N (N m) count absolutely: a limit violated by a rounding error pushes with almost no force.
     fn add_force(&mut self, got: &[f64], want: &[f64]) {
         self.0.push(distance(got, want, 1.0));
     }
@@ -87,7 +88,7 @@ fn lane<T: Real>(v: &[T], i: usize) -> Vec<f64> {
 
 fn compare<T: Real>(model: &Model, states: &[Value], ground_contacts_only: bool) -> Comparison {
     let mut model = model.clone();
-    // double precision is solved to the end; single precision keeps the model's own tolerance
+    // double precision is solved to convergence; single precision keeps the model's own tolerance
     if T::scalar(1.0 + 1e-12) != T::scalar(1.0) {
         model.opt.tolerance = 1e-14;
         model.opt.ls_iterations = 100;
@@ -139,7 +140,7 @@ fn compare<T: Real>(model: &Model, states: &[Value], ground_contacts_only: bool)
         for (i, s) in chunk.iter().enumerate() {
             let want = |key: &str| numbers(&s[key]);
             out.qacc.add(&lane(&acc, i), &want("qacc"));
-            // the forces of a medium and of pushes are added to the bias and taken off again
+            // the forces of a medium and of pushes are added to the bias and subtracted again
             let others = want("qfrc_applied").iter().map(|x| x * x).sum::<f64>().sqrt();
             out.bias.0.push(distance(&lane(&bias, i), &want("qfrc_bias"), others.max(1e-9)));
             out.applied.add(&lane(&applied, i), &want("qfrc_applied"));
@@ -160,7 +161,7 @@ fn compare<T: Real>(model: &Model, states: &[Value], ground_contacts_only: bool)
             out.positions.add(&lane(&positions, i), &want_positions);
             let data = want("sensordata");
             for (adr, values) in &sensors {
-                // touch and other forces inherit the constraint forces' scale
+                // touch and other forces have the scale of the constraint forces
                 let w = &data[*adr..*adr + values.len()];
                 let scale = w.iter().fold(1.0, |a: f64, x| a.max(x.abs()));
                 let got = lane(values, i);
@@ -176,7 +177,7 @@ fn compare<T: Real>(model: &Model, states: &[Value], ground_contacts_only: bool)
     out
 }
 
-/// What the comparison of a model must show.
+/// Expected results of the comparison of a model.
 struct Bars {
     /// Largest error in double precision, except for sensors (ten times that).
     double: f64,
@@ -246,7 +247,7 @@ fn check(path: &Path, answer: &Value, ground_contacts_only: bool, bars: &Bars, f
             check("cinert, cvel, qfrc_actuator", c.central.max(), 2e-5);
             check("bias", c.bias.max(), 1e-5);
             check("applied", c.applied.max(), 1e-5);
-            // forces of contacts and limits, and what follows from them
+            // forces of contacts and limits, and values that depend on them
             check("sensors median", c.sensors.median(), bars.median);
             check("sensors max", c.sensors.max(), bars.max);
             check("cfrc_ext median", c.external.median(), bars.median);
@@ -299,7 +300,7 @@ fn everything_at_once_agrees_with_mujoco() {
     let answers = common::oracle("dynamics.py", &Value::Array(jobs));
     let mut failures = Vec::new();
     for (path, answer) in paths.iter().zip(answers.as_array().expect("a list")) {
-        // of forces within a link most cancels
+        // forces within a link mostly cancel
         let slack = if path.ends_with("springs.xml") { 10.0 } else { 1.0 };
         let bars = Bars { double: 1e-8, median: 5e-6 * slack, max: 1e-2, contacts: 0 };
         check(path, answer, false, &bars, &mut failures);

@@ -1,15 +1,16 @@
-//! Contract: models that nobody wrote agree with MuJoCo.
+//! Contract: randomly generated models agree with MuJoCo.
 //!
-//! `tests/oracle/random_models.py` draws models out of everything that `docs/physics.md` lists as supported: every
-//! joint, shape, actuator, tendon, constraint, sensor, integrator and option, in any combination. Each compiles to
-//! MuJoCo's numbers. On random states, double precision has MuJoCo's mass matrix, bias, applied and constraint forces,
-//! accelerations, contacts, sensors and next state to 1e-5, and mostly to 1e-12; single precision has those of double
-//! precision to 1e-2. One thing is left out (`docs/physics.md` names it): what constraints do, in MuJoCo, on bodies that
-//! can only turn about their centers of mass, and welds on those that can only slide; of those, single precision has the
-//! motion of double precision, not the forces. Where an acceleration differs, the oracle says who is nearer to the minimum of MuJoCo's own problem:
-//! it is MuJoCo's error if that is us, and by far.
+//! `tests/oracle/random_models.py` draws models from everything that `docs/physics.md` lists as supported: every joint,
+//! shape, actuator, tendon, constraint, sensor, integrator and option, in any combination. Each compiles to MuJoCo's
+//! numbers. On random states, double precision has MuJoCo's mass matrix, bias, applied and constraint forces,
+//! accelerations, contacts, sensors and next state to 1e-5, and mostly to 1e-12. Single precision has those of double
+//! precision to 1e-2. One thing is left out (`docs/physics.md` names it): constraint forces on bodies that can only
+//! turn about their centers of mass, and welds on bodies that can only slide. For those, single precision has the
+//! motion of double precision, not the forces. Where an acceleration differs, the oracle computes which result is
+//! closer to the minimum of MuJoCo's own problem. It counts as MuJoCo's error if Marathon's is closer by far.
 //!
-//! By default few models are drawn. A long run, which prints a table of what differs, and writes those models to a folder:
+//! By default few models are drawn. A long run prints a table of differences, and writes the differing models to a
+//! folder:
 //!
 //! ```sh
 //! MARATHON_SEEDS=0..5000 MARATHON_OUT=/tmp/models \
@@ -40,19 +41,19 @@ const STATES: usize = 3;
 const DOUBLE: f64 = 1e-5;
 const SINGLE: f64 = 1e-2;
 
-/// Quantities in which constraints have no part.
+/// Quantities that constraints do not affect.
 const UNCONSTRAINED: [&str; 7] =
     ["bias force", "applied force", "actuator force", "mass matrix", "contacts", "body position", "geom position"];
 
-/// Beginnings of the names of quantities in which forces of constraints are seen.
+/// Prefixes of the names of quantities that depend on constraint forces.
 const FORCES: [&str; 3] = ["constraint force", "cfrc_ext", "sensor"];
 
-/// A model and what MuJoCo makes of it.
+/// A model, and MuJoCo's results for it.
 #[derive(Deserialize)]
 struct Answer {
     seed: u64,
     xml: String,
-    /// Why MuJoCo does not compile it.
+    /// Reason why MuJoCo does not compile it.
     error: Option<String>,
     #[serde(default)]
     compiled: Value,
@@ -62,7 +63,7 @@ struct Answer {
     skipped: usize,
 }
 
-/// A state and what follows from it.
+/// A state, and the results for it.
 #[derive(Deserialize)]
 #[allow(non_snake_case)]
 struct State {
@@ -71,10 +72,10 @@ struct State {
     ctrl: Vec<f64>,
     act: Vec<f64>,
     xfrc: Vec<f64>,
-    /// The rounding of single precision does not change the answer much.
+    /// Whether rounding to single precision hardly changes the answer.
     single: bool,
-    /// A constraint acts on bodies that only turn about their centers of mass, or a weld on those that only slide: rounding
-    /// decides what MuJoCo makes of it.
+    /// A constraint acts on bodies that only turn about their centers of mass, or a weld on those that only slide.
+    /// Rounding then decides MuJoCo's result.
     weightless: bool,
     qacc: Vec<f64>,
     qfrc_constraint: Vec<f64>,
@@ -86,21 +87,21 @@ struct State {
     ncon: usize,
     xpos: Vec<f64>,
     geom_xpos: Vec<f64>,
-    /// Nothing where rounding decides.
+    /// `None` where rounding decides.
     sensordata: Vec<Option<f64>>,
     next_qpos: Vec<f64>,
     next_qvel: Vec<f64>,
     next_act: Vec<f64>,
 }
 
-/// Quantities by name, each a vector; NaN stands for what is not known.
+/// Quantities by name, each a vector. NaN stands for an unknown value.
 type Quantities = BTreeMap<String, Vec<f64>>;
 
 fn widen<T: Real>(v: &[T]) -> Vec<f64> {
     v.iter().map(|x| T::widen(x.get(0))).collect()
 }
 
-/// What the simulation makes of a state.
+/// The simulation's results for a state.
 fn ours<T: Real>(sim: &Sim<T>, work: &mut Work<T>, state: &State) -> Quantities {
     let model = sim.model();
     let mut group = Group::new(sim);
@@ -143,7 +144,7 @@ fn ours<T: Real>(sim: &Sim<T>, work: &mut Work<T>, state: &State) -> Quantities 
     out
 }
 
-/// What MuJoCo makes of it.
+/// MuJoCo's results for a state.
 fn theirs(model: &Model, state: &State) -> Quantities {
     let mut out: Quantities = [
         ("acceleration", &state.qacc),
@@ -171,8 +172,8 @@ fn theirs(model: &Model, state: &State) -> Quantities {
     out
 }
 
-/// What differs by more than a bound: quantity and relative difference, absolute below 1. Where rounding decides a
-/// sensor's value it is not compared.
+/// Differences above a bound: quantity and relative difference, absolute below 1. Sensor values that depend on rounding
+/// are not compared.
 fn differences(got: &Quantities, want: &Quantities, bound: f64) -> Vec<(String, f64)> {
     let mut out = Vec::new();
     for (name, want) in want {
@@ -188,7 +189,7 @@ fn differences(got: &Quantities, want: &Quantities, bound: f64) -> Vec<(String, 
     out
 }
 
-/// What became of the models.
+/// Results of the models.
 #[derive(Default)]
 struct Report {
     models: usize,
@@ -197,14 +198,14 @@ struct Report {
     contacts: usize,
     /// Models whose cap stops the solver early.
     capped: usize,
-    /// States in which rounding decides what constraints do in MuJoCo.
+    /// States in which rounding decides MuJoCo's constraint forces.
     weightless: usize,
-    /// States that single precision was asked for.
+    /// States that were compared in single precision.
     single: usize,
-    /// Worst differences that are within the bounds: of double and of single precision.
+    /// Largest differences within the bounds: of double and of single precision.
     worst: [f64; 2],
     failures: BTreeMap<u64, Vec<String>>,
-    /// Accelerations that differ: whose error is it?
+    /// Accelerations that differ. The oracle decides which engine has the error.
     judge: Vec<Value>,
 }
 
@@ -231,7 +232,7 @@ impl Report {
             self.fail(seed, format!("compiled: {}", compiled[..compiled.len().min(3)].join("; ")));
         }
         let mut exact = model.clone();
-        // a low cap is followed exactly; other models are solved to the end on both sides
+        // a low cap is followed exactly; other models are solved to convergence on both sides
         self.capped += usize::from(model.opt.iterations < 50);
         if model.opt.iterations >= 50 {
             exact.opt.tolerance = 1e-14;

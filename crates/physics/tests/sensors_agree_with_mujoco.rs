@@ -1,8 +1,8 @@
 //! Contract: sensors have MuJoCo's values.
 //!
-//! Models with every kind of sensor that is evaluated, in random states in which bodies touch the ground and each other.
-//! Double precision agrees to 1e-8 of the sensor's size; single precision, in every lane width, to the rounding of its
-//! arithmetic.
+//! The models have every supported kind of sensor. Their states are random, with bodies that touch the ground and each
+//! other. Double precision agrees to 1e-8 of the sensor's size. Single precision agrees in every lane width to the
+//! rounding of its arithmetic.
 
 mod common;
 
@@ -28,7 +28,7 @@ fn models() -> Vec<PathBuf> {
 fn oracle(paths: &[PathBuf]) -> Value {
     let job = |(i, path): (usize, &PathBuf)| {
         let mut job = json!({"xml": path, "states": STATES, "seed": i, "ground_only": false, "pushes": true});
-        // bodies meet each other, but range finders see more from afar
+        // bodies near each other touch, but range finders see more from afar
         if !path.ends_with("rays.xml") {
             job["spread"] = json!(0.4);
         }
@@ -37,8 +37,8 @@ fn oracle(paths: &[PathBuf]) -> Value {
     common::oracle("dynamics.py", &Value::Array(paths.iter().enumerate().map(job).collect()))
 }
 
-/// What the error of a sensor is compared with: its own size, or for forces, if they are not `exact`, the largest of
-/// all sensors' sizes, because forces are differences of others.
+/// The scale for a sensor's error. It is the sensor's own size, or, for forces without `exact`, the largest size of all
+/// sensors, because forces are differences of others.
 fn scale(kind: SensorType, exact: bool, wanted: &[f64], data: &[f64]) -> f64 {
     use SensorType as S;
     let size = |v: &[f64]| v.iter().fold(1.0, |a: f64, x| a.max(x.abs()));
@@ -49,7 +49,7 @@ fn scale(kind: SensorType, exact: bool, wanted: &[f64], data: &[f64]) -> f64 {
 /// Per sensor: errors over all states.
 fn compare<T: Real>(model: &Model, states: &[Value]) -> Vec<Vec<f64>> {
     let mut model = model.clone();
-    // double precision is solved to the end; single precision keeps the model's own tolerance
+    // double precision is solved to convergence; single precision keeps the model's own tolerance
     let double = T::scalar(1.0 + 1e-12) != T::scalar(1.0);
     if double {
         model.opt.tolerance = 1e-14;
@@ -90,7 +90,7 @@ fn compare<T: Real>(model: &Model, states: &[Value]) -> Vec<Vec<f64>> {
     errors
 }
 
-/// The value below which a share of the numbers lies; NaN is the largest of all.
+/// The value below which a fraction of the numbers lies. NaN is the largest of all.
 fn quantile(v: &[f64], share: f64) -> f64 {
     let mut v = v.to_vec();
     v.sort_by(f64::total_cmp);
@@ -125,7 +125,7 @@ fn sensors_agree_with_mujoco() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-/// Sensors of the models here really see something: a value that is 0 in all states proves nothing.
+/// Sensors of these models measure something: a value that is 0 in all states proves nothing.
 #[test]
 fn random_states_excite_the_sensors() {
     let paths = models();
@@ -141,7 +141,7 @@ fn random_states_excite_the_sensors() {
     }
 }
 
-/// A range finder sees the ground of its own agent: that of a model with other elevations.
+/// A range finder measures the ground of its own agent, as in a model with those elevations.
 #[test]
 fn range_finders_see_the_agents_own_ground() {
     let path = common::workspace().join("crates/physics/tests/models/sensors/rays.xml");

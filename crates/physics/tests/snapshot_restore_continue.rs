@@ -1,4 +1,4 @@
-//! Contract: snapshot, restore, continue equals never having stopped.
+//! Contract: restoring a snapshot and continuing equals an uninterrupted simulation.
 
 mod common;
 
@@ -18,7 +18,7 @@ fn check(file: &str) {
     let model = Model::from_xml_file(common::workspace().join(file)).unwrap_or_else(|e| panic!("{e}"));
     let options = BatchOptions { agents: 20, ..Default::default() };
     let mut batch = Batch::new(&model, &options).expect("supported");
-    // some agents have things of their own, which are part of their state
+    // some agents have their own constants and ground, which are part of their state
     let mut own = Variation::none(&model);
     own.mass.fill(1.2);
     own.friction = 0.7;

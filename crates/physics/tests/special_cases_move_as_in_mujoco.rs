@@ -1,4 +1,4 @@
-//! Models that run into a special case move as MuJoCo moves them.
+//! Models in special cases move as in MuJoCo.
 //!
 //! Each model is stepped from its reference configuration under its own settings, in double precision on both sides.
 //! The states are compared every ten steps.

@@ -1,7 +1,7 @@
-//! Promise: within a call of `Batch::step`, what is kept from one evaluation of the forces to the next (which pairs are
-//! too far apart to touch, which rows pushed) saves work and changes nothing: agents end where they end when every step
-//! is a call of its own, which starts without it. Contacts agree exactly. States have the same bits in all but a few calls,
-//! in which the solver comes to the same forces on another way, to rounding.
+//! Promise: within a call of `Batch::step`, data from the previous evaluation of the forces (pairs that are too far
+//! apart to touch, pushing rows) saves work and changes nothing. Agents end where they end when every step is a
+//! separate call, which starts without that data. Contacts agree exactly. States have the same bits in all but a few
+//! calls, in which the solver takes another path to the same forces, up to rounding.
 
 mod common;
 
@@ -13,7 +13,7 @@ const AGENTS: usize = 16;
 const STEPS: usize = 5;
 /// Calls: a second of falling and thrashing.
 const CALLS: usize = 60;
-/// Largest difference that rounding makes in a call: of velocities in contact, m/s and rad/s.
+/// Largest difference that rounding causes in a call: of velocities in contact, m/s and rad/s.
 const ROUNDING: f64 = 2e-3;
 
 /// Largest difference between the states of two batches.

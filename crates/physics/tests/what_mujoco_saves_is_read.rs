@@ -1,9 +1,10 @@
-//! The loader reads what MuJoCo writes: a model that loads still loads after MuJoCo has saved it.
+//! The loader reads MuJoCo's output: a model that loads still loads after MuJoCo has saved it.
 //!
-//! MuJoCo's writer expands includes, classes and shortcuts in its own way. Every public model that the tests install (see
-//! `docs/models.md`) is saved by MuJoCo (`MjSpec.to_xml`, the writer of `mj_saveLastXML`). If the loader takes the original, it
-//! takes the saved file, and compiles it to what MuJoCo compiles it to. And the loader knows every element and attribute of
-//! MuJoCo's schema, which the writer can emit: it may refuse one by name, but none is a spelling mistake.
+//! MuJoCo's writer expands includes, classes and shortcuts in its own way. MuJoCo saves every public model that the
+//! tests install (see `docs/models.md`) with `MjSpec.to_xml`, the writer of `mj_saveLastXML`. If the loader accepts the
+//! original, it accepts the saved file, and compiles it to MuJoCo's model. The loader also knows every element and
+//! attribute of MuJoCo's schema, which the writer can emit. It may refuse one by name, but does not report it as a
+//! spelling mistake.
 
 mod common;
 
@@ -52,13 +53,13 @@ fn public_models_load_after_mujoco_has_saved_them() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-/// An element as the schema has it: its path from the top, and its attributes.
+/// An element of the schema: its path from the top, and its attributes.
 struct Element {
     path: Vec<String>,
     attributes: Vec<String>,
 }
 
-/// Reads what `mj_printSchema` prints: names indented by their depth, a mark of how often they may occur, attributes.
+/// Reads the output of `mj_printSchema`: names indented by their depth, a mark for the allowed number, attributes.
 fn schema() -> Vec<Element> {
     let text = oracle("schema.py", &Value::Null);
     let (mut elements, mut stack): (Vec<Element>, Vec<String>) = (Vec::new(), Vec::new());

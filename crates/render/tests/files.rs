@@ -1,4 +1,4 @@
-//! Files hold what was drawn, appear whole or not at all, and failures say which file and why.
+//! Files hold the drawn pictures and appear completely or not at all. Failures name the file and the reason.
 
 mod common;
 
@@ -9,7 +9,7 @@ use marathon_render::{
     Camera, Corner, Format, GifWriter, Image, Mp4Writer, Recorder, RenderError, Renderer, status_line, strip,
 };
 
-/// Pictures of a camera that moves along, like a film of a run.
+/// Pictures of a moving camera, like a film of a run.
 fn film(count: usize) -> Vec<Image> {
     let (frame, camera) = common::shapes();
     let renderer = Renderer::new(96, 60).unwrap();
@@ -141,7 +141,7 @@ fn failures_name_the_file_and_leave_none() {
     assert!(matches!(Image::new(10, 1 << 40, [0; 3]), Err(RenderError::Size { .. })));
 }
 
-/// Stands in for ffmpeg: lists one encoder, checks its input's size and leaves it in the output file.
+/// A stand-in for ffmpeg: lists one encoder, checks its input's size and copies it to the output file.
 #[cfg(unix)]
 fn stand_in(folder: &Folder, body: &str) -> String {
     use std::os::unix::fs::PermissionsExt;
@@ -187,7 +187,7 @@ fn mp4_reports_the_encoders_own_words() {
     let folder = Folder::new("mp4-fails");
     let program = stand_in(&folder, "echo 'no space for this film' >&2; exit 3");
     let mut writer = Mp4Writer::with_program(folder.path("run.mp4"), 25.0, &program).unwrap();
-    // the pipe may take a few frames before the writer learns that nobody reads
+    // the pipe may take a few frames before the writer notices that its reader is gone
     let failed = film(40).iter().find_map(|frame| writer.push(frame).err());
     let message = match failed {
         Some(error) => error.to_string(),

@@ -1,4 +1,4 @@
-//! The following camera keeps a runner in the picture without shaking and without lag.
+//! The following camera keeps a character in the picture without shaking and without lag.
 
 mod common;
 
@@ -53,7 +53,7 @@ fn who_turns_aside_stays_in_the_picture_and_who_sways_does_not_move_it() {
         last = at(-0.1 * f64::from(i), dt);
     }
     assert!((last - first + 28.9).abs() < 0.2, "{last}");
-    // after a jump in time, too, it knows where he began
+    // after a jump in time, too, the start position is kept
     assert!((at(8.0, 5.0) - first - 7.0).abs() < 1e-9);
     assert!((at(0.0, 5.0) - first).abs() < 1e-9);
 }
@@ -70,7 +70,7 @@ fn first_frame_and_odd_time_steps_are_sane() {
         let mut follow = Follow::new(&scene, 2, 640, 360);
         let jump = follow.update(&frame, dt);
         assert!((jump.target[0] - frame.agents()[0].com[0]).abs() < 1e-6, "dt {dt}: {jump:?}");
-        // a runner that is put back to the start must not throw the camera beyond the two places
+        // a reset of the character must not move the camera beyond the two positions
         for _ in 0..50 {
             let camera = follow.update(&start, dt);
             assert!((-200.0..=1001.0).contains(&camera.target[0]), "dt {dt}: {camera:?}");

@@ -1,4 +1,4 @@
-//! A ghost is the figure at another `qpos`: pale, without a shadow, and as thin where its parts overlap as elsewhere.
+//! A ghost is the character at another `qpos`: pale, without a shadow, and equally translucent where its parts overlap.
 
 use marathon_physics::Model;
 use marathon_render::{Antialias, Camera, GhostPlace, Image, Renderer, Scene};
@@ -13,7 +13,7 @@ fn scene(geoms: &str) -> Scene {
     Scene::new(&Model::from_xml_str(&text, "ball").unwrap())
 }
 
-/// A ball at the origin, 1 m high, and a ghost of it where it is said to be, if anywhere.
+/// A ball at the origin, 1 m high, and its ghost at the given position, if any.
 fn picture(geoms: &str, ghost: Option<[f64; 3]>, place: GhostPlace) -> Image {
     let pose = |[x, y, z]: [f64; 3]| vec![x, y, z, 1.0, 0.0, 0.0, 0.0];
     let ghosts: Vec<Vec<f64>> = ghost.map(pose).into_iter().collect();
@@ -65,7 +65,7 @@ fn a_figure_on_its_clip_hides_its_ghost() {
     let at = Some([0.0, 0.0, 1.0]);
     let alone = picture(BALL, None, GhostPlace::Inside);
     assert_eq!(differences(&alone, &picture(BALL, at, GhostPlace::Inside)).2, 0);
-    // in the lane behind, which is higher in the picture, it is seen
+    // in the lane behind, which is higher in the picture, it is visible
     let (_, [top, bottom], count) = differences(&alone, &picture(BALL, at, GhostPlace::Beside));
     assert!(count > 20 && top < bottom && bottom < SIDE / 2, "rows {top} to {bottom}, {count} pixels");
 }

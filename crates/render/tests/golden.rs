@@ -1,4 +1,4 @@
-//! A small scene with every shape looks as it did when a person last looked at it.
+//! A small scene with every shape looks as it did when a person last checked it.
 //!
 //! After a wanted change: `MARATHON_UPDATE_GOLDEN=1 cargo test -p marathon-render --test golden`, then look at
 //! `tests/golden/shapes.png` before committing it.
@@ -72,7 +72,7 @@ fn adaptive_antialiasing_is_close_to_brute_force() {
 fn what_the_model_hides_is_not_drawn() {
     let model = common::model("shapes.xml");
     let mut bare = model.clone();
-    // the alpha-0 box and the group-3 hull enclose everything: were they drawn, the picture would change
+    // the alpha-0 box and the group-3 hull enclose everything: if they were drawn, the picture would change
     bare.geoms.retain(|geom| geom.name != "invisible" && geom.name != "hull");
     let camera = Camera { eye: [0.9, -6.4, 2.5], target: [0.25, 0.0, 0.42], fovy: 38.0 };
     let renderer = Renderer::new(64, 40).unwrap();

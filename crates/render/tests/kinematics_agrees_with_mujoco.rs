@@ -1,4 +1,4 @@
-//! Geoms are where MuJoCo puts them, at random configurations of models written here and elsewhere.
+//! Geoms have MuJoCo's poses, at random configurations of Marathon's models and others.
 
 mod common;
 
@@ -27,7 +27,7 @@ fn python() -> PathBuf {
 fn oracle(input: &Value) -> Value {
     let mut child = Command::new(python())
         .arg(workspace().join("tests/oracle/poses.py"))
-        // MuJoCo leaves a log of its warnings where it runs
+        // MuJoCo writes a log of its warnings to the working directory
         .current_dir(std::env::temp_dir())
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())

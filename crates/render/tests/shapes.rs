@@ -1,5 +1,5 @@
-//! A ray meets a shape where the closed form says: on the surface, first, with the right normal; and misses only what
-//! it does not touch.
+//! A ray hits a shape where the closed form says: on the surface, at the first hit, with the right normal. It misses
+//! only what it does not touch.
 
 use marathon_render::Shape;
 

@@ -1,5 +1,5 @@
-//! Obedience is measured: a cart that obeys by a known law has that law's times, errors and drift, and one that falls over has
-//! its falls counted. No number depends on threads.
+//! Command tracking is measured. A cart that follows commands by a known law has that law's times, errors and drift. A
+//! cart that falls over has its falls counted. The numbers do not depend on threads.
 
 use marathon_envs::{
     Agent, CommandRange, Ctrl, EpisodeRng, Facts, Obs, Senses, Start, Terms, factory, names, register,
@@ -31,13 +31,13 @@ const MODEL: &str = r#"
 const LAG: f64 = 0.4;
 /// Upward acceleration while it thrusts, m/s^2.
 const THRUST: f64 = 4.0;
-/// Slower than the commanded speed by this, m/s.
+/// Difference by which it stays below the commanded speed, m/s.
 const SLACK: f64 = 0.25;
 
-/// A cart whose motor makes up for what is missing to the commanded speed, whatever the policy does.
+/// A cart whose motor corrects the difference from the commanded speed, whatever the policy does.
 #[derive(Clone, Copy)]
 struct Cart {
-    /// Speed beyond which it counts as fallen, m/s.
+    /// Speed above which it counts as fallen, m/s.
     breaks_at: f64,
 }
 
@@ -67,7 +67,7 @@ impl Agent for Cart {
     fn ctrl<T: Real>(&self, c: &mut Ctrl<T>) {
         let slack = c.command[0].min(T::lit(SLACK)).max(T::lit(-SLACK));
         c.ctrl[0] = (c.command[0] - slack - c.qvel[0]) * T::lit(2.0 / LAG);
-        // thrusts for as long as it is told, from 0.2 s on
+        // thrusts for as long as commanded, from 0.2 s on
         c.memory[0] = (c.memory[0] + T::lit(0.01)) * c.command[1];
         c.ctrl[1] = T::select(T::lit(0.2).lt(c.memory[0]), T::lit(2.0 * (10.0 + THRUST)), T::zero());
     }
@@ -108,13 +108,13 @@ fn a_cart_with_a_lag_has_the_times_of_the_lag() {
     assert_eq!(got, measured("StrongCart-v0", 3));
     assert_eq!((got.agents, got.minutes.without_fall, got.minutes.falls_per_minute), (20, 20, 0.0));
     assert_eq!(got.minutes.early_falls, 0);
-    // half of the commands are below the slack, where it stands still
+    // half of the commands are below the difference, where it stands still
     let settled = got.minutes.settled_error;
     assert!((0.15..SLACK).contains(&settled) && got.minutes.velocity_error > settled, "{:?}", got.minutes);
     assert_eq!(got.responses.len(), 6);
     for r in &got.responses {
         assert_eq!((r.agents, r.falls), (20, 0));
-        // from and to are off by the slack, unless they are rest
+        // start and end speeds are off by the difference, unless they are zero
         let [from, to] = [r.from, r.to].map(|v| v - v.signum() * if v == 0.0 { 0.0 } else { SLACK });
         let time = |share: f64| {
             let wanted = r.from + share * (r.to - r.from);
@@ -123,7 +123,7 @@ fn a_cart_with_a_lag_has_the_times_of_the_lag() {
         };
         for (got, expected) in [(r.to_63, time(0.63)), (r.to_90, time(0.9))] {
             match (got, expected) {
-                // the command is observed a decision later, and the speed is that of a decision
+                // the command is observed one decision later, and the speed is that of a decision
                 (Some(got), Some(expected)) => assert!((got - expected).abs() < 0.03, "{r:?}: {expected}"),
                 (got, expected) => assert_eq!(got, expected, "{r:?}"),
             }
@@ -134,13 +134,13 @@ fn a_cart_with_a_lag_has_the_times_of_the_lag() {
     }
     assert_eq!((got.stand.still, got.stand.falls), (20, 0));
     assert!(got.stand.drift.unwrap() < 1e-3 && got.stand.speed.unwrap() < 1e-3 && got.turns.is_empty());
-    // it thrusts from 0.2 s to 1 s, and flies on
+    // it thrusts from 0.2 s to 1 s, and stays in the air
     assert_eq!(got.jumps.iter().map(|jump| jump.speed).collect::<Vec<_>>(), [0.0, 1.0, 2.0]);
     for jump in &got.jumps {
         assert_eq!((jump.agents, jump.prompt, jump.thrown, jump.falls), (20, 20, 20, 0));
         let (latency, height) = (jump.latency.unwrap(), jump.height.unwrap());
         assert!((0.2..0.3).contains(&latency), "{latency}");
-        // it has to rise fast enough first
+        // it must first rise fast enough
         let thrown = jump.thrown_latency.unwrap();
         assert!((latency..latency + 0.1).contains(&thrown), "{thrown}");
         let (way, speed) = (0.5 * THRUST * 0.8 * 0.8, THRUST * 0.8);
@@ -148,7 +148,7 @@ fn a_cart_with_a_lag_has_the_times_of_the_lag() {
     }
     let times: Vec<f64> = got.pushes.iter().map(|push| push.recovery.expect("it recovers")).collect();
     for (push, time) in got.pushes.iter().zip(&times) {
-        // it recovers while it is pushed, too
+        // it also recovers while it is pushed
         let jump = push.velocity * LAG / 0.1 * (1.0 - (-0.1f64 / LAG).exp());
         let expected = if jump > 0.3 { 0.1 + LAG * (jump / 0.3).ln() } else { 0.0 };
         assert!((time - expected).abs() < 0.15, "{push:?}: {expected}");
@@ -161,7 +161,7 @@ fn a_cart_with_a_lag_has_the_times_of_the_lag() {
 fn falls_are_counted_where_they_happen() {
     register(Arc::new(Cart { breaks_at: 1.5 })).expect("the name is free");
     let got = measured("WeakCart-v0", 1);
-    // random commands are below 1 m/s, those of the steps are 2 m/s: too fast before, or too fast after
+    // random commands are below 1 m/s, those of the speed steps are 2 m/s: too fast before, or too fast after
     assert_eq!(got.minutes.without_fall, 20);
     for r in &got.responses {
         let expected = if r.from == 0.0 { (20, 20) } else { (0, 0) };
@@ -169,7 +169,7 @@ fn falls_are_counted_where_they_happen() {
         assert_eq!(r.error.is_none(), r.agents == 0, "{r:?}");
     }
     assert_eq!(got.stand.still, 20);
-    // nobody is left to jump at 2 m/s
+    // all agents have fallen before a jump at 2 m/s
     assert_eq!(got.jumps.iter().map(|jump| (jump.agents, jump.falls)).collect::<Vec<_>>(), [(20, 0), (20, 0), (0, 0)]);
     // at 0.75 m/s, a push forward by 1 m/s is too much, one backward is not
     let falls: Vec<u64> = got.pushes.iter().map(|push| push.falls).collect();

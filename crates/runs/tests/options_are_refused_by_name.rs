@@ -1,9 +1,9 @@
-//! An option that makes no sense is refused by its name, which each front end spells in its own way: a caller of the library
-//! is told of `steps`, a user of the command of `--steps`.
+//! An invalid option is refused by its name, in the spelling of each front end: `steps` for a caller of the library,
+//! `--steps` for a user of the command.
 
 use marathon_runs::{FilmOptions, Flags, LearnOptions, RunError, RunOptions, Session, Task};
 
-/// What a refusal says with the names as they are.
+/// The text of a refusal with plain names.
 #[track_caller]
 fn refused(result: Result<(), RunError>) -> String {
     let error = result.expect_err("a refusal");

@@ -1,5 +1,6 @@
-//! What policies know is not lost: one policy learns what several do, in a small part of the time that each of them took; and a
-//! run that starts from a policy acts as that did, though it observes more. Whoever does not fit is refused by name.
+//! Policies can build on others. One policy learns the behavior of several in a fraction of the time that each of them
+//! took. A run that starts from a policy acts like that policy, though it observes more. Policies that do not fit are
+//! refused by name.
 
 use marathon_envs::options::Value;
 use marathon_learn::{Control, EvalOptions, Policy, evaluate};
@@ -16,7 +17,7 @@ fn man(options: &[(&str, &str)]) -> Setting {
     Setting::named("MarathonMan").unwrap().with(&TaskOptions { given }).unwrap()
 }
 
-/// Half a minute of processor time teaches a walk and a run to one network; each took minutes alone.
+/// Half a minute of processor time teaches a walk and a run to one network. Each took minutes alone.
 #[test]
 fn one_policy_walks_and_runs() {
     let teachers = [shipped("MarathonManWalk"), shipped("MarathonManRun"), shipped("MarathonManRun")];
@@ -31,13 +32,13 @@ fn one_policy_walks_and_runs() {
     let (first, last) = (rounds[8].loss, rounds[rounds.len() - 1].loss);
     assert!(last < 0.25 * first, "the loss has fallen from {first} to {last} only");
     assert_eq!(policy.meta().options.get("clip"), Some(&Value::Text("walk,run".into())));
-    // 5 s from the first frame; without having learned anything, he falls within half a second
+    // 5 s from the first frame; an untrained character falls within half a second
     let done = imitation::from_beginning(&policy, &EvalOptions { episodes: 16, ..Default::default() }).unwrap();
     let seconds: Vec<f64> = done.iter().map(|clip| clip.seconds).collect();
     assert!(seconds.len() == 2 && seconds.iter().all(|s| *s > 10.0), "he goes on for {seconds:?} s");
 }
 
-/// The same seed gives the same policy, whatever the number of threads; another seed another one.
+/// The same seed gives the same policy for any number of threads; another seed gives another one.
 #[test]
 fn threads_change_nothing() {
     let learned = |threads: usize, seed: u64| {
@@ -73,7 +74,7 @@ fn teachers_that_do_not_fit_are_refused() {
     };
     let text = learn(Setting::named("walker").unwrap(), &[shipped("hopper")]);
     assert!(text.contains("hopper.safetensors") && text.contains("actions") && text.contains("Walker2d-v0"), "{text}");
-    // Marathon Man with a clip knows no commands
+    // Marathon Man with a clip has no commands
     let text = learn(man(&[]), &[shipped("MarathonManSteer")]);
     assert!(
         text.contains("observation") && text.contains("'command' of 6 numbers") && text.contains("phase (4)"),
@@ -82,7 +83,8 @@ fn teachers_that_do_not_fit_are_refused() {
     assert!(learn(man(&[]), &[]).contains("teacher is not given"));
 }
 
-/// A run of Marathon Man that sees a later frame, too, starts from the walk of one that does not: it acts alike at first.
+/// A run of Marathon Man that also observes a later frame starts from the walk of one that does not: it first acts
+/// alike.
 #[test]
 fn a_run_starts_from_a_policy_that_observes_less() {
     let folder = tempfile::tempdir().unwrap();
@@ -102,7 +104,7 @@ fn a_run_starts_from_a_policy_that_observes_less() {
     let agreement = |policy: &Policy| {
         let (mut apart, mut own) = (0.0, 0.0);
         for i in 0..64 {
-            // anything near what he observes
+            // values near its observations
             let obs: Vec<f32> = (0..119)
                 .map(|k| {
                     let (mean, std) = (old.normalizer().mean(), old.normalizer().std());
@@ -127,8 +129,8 @@ fn a_run_starts_from_a_policy_that_observes_less() {
     );
 }
 
-/// Of a task with two roles the first one starts from the policy. If only its value function learns, it plays as that does, while
-/// the other role learns against it.
+/// With two roles, the first one starts from the policy. If only its value function learns, it plays like the policy,
+/// while the other role learns against it.
 #[test]
 fn a_role_may_play_as_it_is() {
     let folder = tempfile::tempdir().unwrap();
@@ -144,18 +146,18 @@ fn a_role_may_play_as_it_is() {
     let (session, _) = Session::open(Some(task), &options, None, false).unwrap();
     let outcome = session.carry_out(false, &mut |_| Control::Continue).unwrap();
     let (old, new) = (policy_file::read(&path, None).unwrap(), outcome.policy);
-    // and from that of such a run
+    // and from the policy of such a run
     let again = RunOptions { initialize_from: Some(folder.path().join("run")), out: None, ..options };
     drop(outcome.folder);
     let (session, _) = Session::open(Some(Task::named("TerrainWalker2d").unwrap()), &again, None, true).unwrap();
     assert_eq!(session.run.initialize_from, again.initialize_from);
     let [(name, builder)] = &outcome.others[..] else { panic!("one other role") };
     assert!(name == "builder" && builder.meta().act == 1);
-    // the statistics have moved, and the first layer with them
+    // the statistics have changed, and the first layer with them
     assert_ne!(new.params(), old.params());
     let (second, _) = old.net().layers().nth(1).expect("it has hidden layers");
     assert_eq!(new.params()[second.start..], old.params()[second.start..]);
-    // what it observes now and then: farther away, observations are clipped, and what never varied does not now
+    // typical observations: larger ones are clipped, and constant inputs stay constant
     let usual = old.normalizer().mean().iter().zip(old.normalizer().std());
     let varied = |k: usize, std: f32| if std < 2e-4 { 0.0 } else { std * (k as f32).sin() };
     let obs: Vec<f32> = usual.enumerate().map(|(k, (mean, std))| mean + varied(k, *std)).collect();

@@ -1,5 +1,5 @@
-//! Recordings of a figure that is not Marathon's: 2 s of walking, of a taller person with longer legs, whose arms are out at
-//! rest. One skeleton under the names, units and axes of several programs.
+//! Recordings of a foreign character: 2 s of walking of a taller person with longer legs and arms out at rest. One
+//! skeleton with the names, units and axes of several programs.
 
 use glam::{DQuat, DVec3, EulerRot};
 use marathon_envs::registry;
@@ -16,8 +16,8 @@ const LEGS: f64 = 1.16;
 /// Height of the hips at rest: the person's, cm, and Marathon Man's, m.
 const HIPS: [f64; 2] = [100.0, 0.8643];
 
-/// A joint: its name in Mixamo's skeletons, what it hangs from, where it is at rest from there, and the body of Marathon Man
-/// that turns as it does. In centimeters; x to the left, y up, z forward.
+/// A joint: its name in Mixamo's skeletons, its parent, its rest offset from there, and the body of Marathon Man that
+/// rotates like it. In centimeters; x to the left, y up, z forward.
 struct Joint(&'static str, Option<usize>, [f64; 3], &'static str);
 
 const JOINTS: [Joint; 21] = [
@@ -44,13 +44,13 @@ const JOINTS: [Joint; 21] = [
     Joint("RightHand", Some(19), [-26.0, 0.0, 0.0], "right_larm"),
 ];
 
-/// Place of the hips, cm, and turn of each joint from rest in the axes of the world.
+/// Position of the hips, cm, and rotation of each joint from rest in the world's axes.
 struct Instant {
     hips: DVec3,
     turns: Vec<DQuat>,
 }
 
-/// The joints' turns at so many instants a second.
+/// Rotations of the joints, at a number of instants per second.
 fn walking(rate: f64) -> Vec<Instant> {
     let model = registry::agent("MarathonMan").unwrap().model().unwrap();
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/motions/marathon_man/walk.motion");
@@ -78,7 +78,7 @@ fn axes(q: DQuat) -> DQuat {
     DQuat::from_xyzw(q.y, q.z, q.x, q.w)
 }
 
-/// From arms that are out to those of Marathon Man at rest.
+/// Rotation from arms that are out to those of Marathon Man at rest.
 fn lowered(model: &Model, joint: &Joint) -> DQuat {
     let side = if joint.0.starts_with("Left") { DVec3::Y } else { -DVec3::Y };
     let down = match joint.3 {
@@ -95,7 +95,7 @@ fn lowered(model: &Model, joint: &Joint) -> DQuat {
     DQuat::from_rotation_arc(side, DVec3::from_array(down).normalize())
 }
 
-/// A BVH file as CMU's motions have it, in centimeters, at 120 Hz; with other names for the joints if one likes.
+/// A BVH file like CMU's motions, in centimeters, at 120 Hz; optionally with other joint names.
 pub fn bvh(name: impl Fn(&str) -> String) -> String {
     fn joint(i: usize, name: &impl Fn(&str) -> String, out: &mut String) {
         let Joint(own, parent, [x, y, z], _) = JOINTS[i];
@@ -127,13 +127,13 @@ pub fn bvh(name: impl Fn(&str) -> String) -> String {
     out
 }
 
-/// A turn of a joint's own frame while it rests, such as Blender's bones have.
+/// A rotation of a joint's own rest frame, as in Blender's bones.
 fn own_frame(joint: usize) -> DQuat {
     DQuat::from_euler(EulerRot::XYZ, 0.3 * joint as f64, -0.2 * joint as f64, 0.5)
 }
 
-/// A `.glb` file of one of Mixamo's characters as Blender exports it: an armature of centimeters that lies on its back, 30
-/// keys a second.
+/// A `.glb` file of one of Mixamo's characters as exported by Blender: an armature in centimeters that lies on its
+/// back, with 30 keys per second.
 pub fn glb() -> Vec<u8> {
     let armature = DQuat::from_rotation_x(-90f64.to_radians());
     let above = |i: usize| JOINTS[i].1.map_or(armature, own_frame);
@@ -173,7 +173,7 @@ pub fn glb() -> Vec<u8> {
     for (i, joint) in JOINTS.iter().enumerate() {
         let turns = instants.iter().flat_map(|Instant { turns, .. }| {
             let local = joint.1.map_or(turns[i], |parent| turns[parent].conjugate() * turns[i]);
-            // a turn in the axes of the figure at rest, seen from the joint's own frame
+            // a rotation in the axes of the rest pose, in the joint's own frame
             numbers(above(i).conjugate() * local * own_frame(i))
         });
         let output = data(turns.collect(), 4, "VEC4");

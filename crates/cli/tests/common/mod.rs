@@ -1,4 +1,4 @@
-//! Runs the command in a folder of its own and reads what it leaves.
+//! Runs the command in its own folder and reads the results.
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
@@ -17,12 +17,12 @@ pub fn marathon(folder: &Path, args: &[&str]) -> Command {
     command
 }
 
-/// The command as it calls itself.
+/// The command under its usual name.
 pub fn program() -> &'static str {
     env!("CARGO_BIN_EXE_marathon")
 }
 
-/// Waits until a file has at least so many lines.
+/// Waits until a file has at least this many lines.
 pub fn wait_for_lines(path: &Path, lines: usize) {
     let deadline = Instant::now() + Duration::from_secs(60);
     while std::fs::read_to_string(path).unwrap_or_default().lines().count() < lines {
@@ -31,19 +31,19 @@ pub fn wait_for_lines(path: &Path, lines: usize) {
     }
 }
 
-/// Runs the command to its end.
+/// Runs the command to completion.
 pub fn run(folder: &Path, args: &[&str]) -> Output {
     marathon(folder, args).output().expect("the command starts")
 }
 
-/// Runs the command, which must succeed; returns its stdout.
+/// Runs the command, which must succeed. Returns its stdout.
 pub fn succeed(folder: &Path, args: &[&str]) -> String {
     let output = run(folder, args);
     assert!(output.status.success(), "{args:?}: {}", stderr(&output));
     String::from_utf8(output.stdout).expect("stdout is text")
 }
 
-/// Runs the command, which must fail with `code`; returns its stderr.
+/// Runs the command, which must fail with `code`. Returns its stderr.
 pub fn fail(folder: &Path, code: i32, args: &[&str]) -> String {
     let output = run(folder, args);
     assert_eq!(output.status.code(), Some(code), "{args:?}: {}", stderr(&output));
@@ -64,7 +64,7 @@ pub fn read_json(path: &Path) -> Value {
     json(&std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display())))
 }
 
-/// Tensors of a policy, without the metadata, which hold times: `(name, shape, bytes)`.
+/// Tensors of a policy, without the metadata, which contain times: `(name, shape, bytes)`.
 pub fn tensors(path: &Path) -> Vec<(String, Vec<usize>, Vec<u8>)> {
     let bytes = std::fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let file = safetensors::SafeTensors::deserialize(&bytes).expect("a safetensors file");
@@ -74,7 +74,7 @@ pub fn tensors(path: &Path) -> Vec<(String, Vec<usize>, Vec<u8>)> {
     all
 }
 
-/// Rows of a CSV file without the columns of time, head included.
+/// Rows of a CSV file without the columns of time, header included.
 pub fn timeless_rows(path: &Path) -> Vec<Vec<String>> {
     let mut reader = csv::ReaderBuilder::new().has_headers(false).from_path(path).expect("a CSV file");
     let rows: Vec<csv::StringRecord> = reader.records().map(|row| row.expect("a row")).collect();
@@ -90,7 +90,7 @@ pub fn event_files(run: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The Python that has the oracles: that of `MARATHON_PYTHON`, else that of `.venv` at the root of the workspace.
+/// The Python with the oracles: that of `MARATHON_PYTHON`, else that of `.venv` at the root of the workspace.
 pub fn python() -> PathBuf {
     let venv = concat!(env!("CARGO_MANIFEST_DIR"), "/../../.venv/bin/python");
     let python = std::env::var_os("MARATHON_PYTHON").map_or(PathBuf::from(venv), PathBuf::from);
@@ -98,7 +98,7 @@ pub fn python() -> PathBuf {
     python
 }
 
-/// A policy that comes with Marathon.
+/// One of Marathon's policies.
 pub fn shipped(name: &str) -> String {
     format!("{}/../../assets/policies/{name}.safetensors", env!("CARGO_MANIFEST_DIR"))
 }
@@ -119,7 +119,7 @@ pub fn assert_no_leftovers(folder: &Path) {
     assert!(left.is_empty(), "left behind: {left:?}");
 }
 
-/// A person in DeepMimic's format who stands, then bends the right elbow.
+/// A recording in DeepMimic's format: a person stands, then bends the right elbow.
 pub fn recording() -> String {
     let frame = |elbow: f64| {
         let turns = |count: usize| ",1,0,0,0".repeat(count);

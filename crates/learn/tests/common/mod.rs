@@ -1,4 +1,4 @@
-//! A task small enough to be learned within a test: hold a drifting puck at the origin of a plane.
+//! A task that is small enough to be learned within a test: hold a drifting puck at the origin of a plane.
 
 #![allow(dead_code, reason = "every test file uses a part")]
 
@@ -21,7 +21,7 @@ struct Puck {
 /// The task; `limit` decisions per episode.
 pub struct PuckTask {
     pub spec: Spec,
-    /// Makes one agent's observation NaN at a decision, to see what the trainer does.
+    /// Makes one agent's observation NaN at a decision, to test the trainer's reaction.
     pub poison: Option<(usize, u32)>,
 }
 
@@ -196,11 +196,11 @@ pub fn small_config() -> TrainConfig {
     })
 }
 
-/// The same with another algorithm, by its name.
+/// A small setting with another algorithm, by its name.
 pub fn small_of(algorithm: &str) -> TrainConfig {
     let small = small_config();
     let config = TrainConfig::of(algorithm).expect("the name of an algorithm");
-    // of SAC, an update from the third rollout on, and a replay that is soon full
+    // for SAC, updates from the third rollout on, and a replay that is soon full
     let algorithm = match config.algorithm {
         Algorithm::Sac(sac) => {
             Algorithm::Sac(Sac { replay: 80 * 40, warmup: 80 * 18, batch: 528, updates: 2, n_step: 3, ..sac })

@@ -2,7 +2,7 @@
 
 #![allow(dead_code, reason = "every test file uses a part")]
 
-/// 64-bit numbers that look random: Knuth's generator, whose upper bits are good enough for inputs of tests.
+/// 64-bit pseudorandom numbers: Knuth's generator, whose upper bits are good enough for test inputs.
 fn random(salt: u64) -> impl Iterator<Item = u64> {
     let mut state = salt.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
     std::iter::repeat_with(move || {
@@ -11,12 +11,12 @@ fn random(salt: u64) -> impl Iterator<Item = u64> {
     })
 }
 
-/// Numbers in [-1, 1) that look random.
+/// Pseudorandom numbers in [-1, 1).
 pub fn noise(n: usize, salt: u64) -> Vec<f64> {
     random(salt).take(n).map(|x| (x >> 11) as f64 / (1u64 << 52) as f64 - 1.0).collect()
 }
 
-/// Such numbers in single precision, exact in it.
+/// Such numbers, exactly representable in single precision.
 pub fn noise_f32(n: usize, salt: u64) -> Vec<f32> {
     random(salt).take(n).map(|x| (x >> 40) as f32 / (1u64 << 23) as f32 - 1.0).collect()
 }

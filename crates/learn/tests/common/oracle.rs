@@ -1,4 +1,4 @@
-//! What PyTorch says.
+//! Reference results of PyTorch.
 
 #![allow(dead_code, reason = "every test file uses a part")]
 
@@ -7,7 +7,7 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-/// Asks a script of `tests/oracle`.
+/// Runs a script of `tests/oracle`.
 pub fn ask_torch(script: &str, request: &Value) -> Value {
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
     let python = match std::env::var_os("MARATHON_PYTHON") {
@@ -22,7 +22,7 @@ pub fn ask_torch(script: &str, request: &Value) -> Value {
         .spawn()
         .unwrap_or_else(|e| panic!("{}: {e}; {advice}", python.display()));
     let mut stdin = child.stdin.take().expect("stdin is piped");
-    // a script that fails at once closes the pipe; its status tells below
+    // a script that fails at once closes the pipe; its status is checked below
     let _ = stdin.write_all(request.to_string().as_bytes());
     drop(stdin);
     let output = child.wait_with_output().expect("the oracle ends");

@@ -1,4 +1,4 @@
-//! A trainer on a loopback port that says what a test wants: the server's side of the protocol.
+//! A trainer on a loopback port that sends what a test requires: the server's side of the protocol.
 
 #![allow(dead_code, reason = "each test file and the bench use a part of it")]
 
@@ -25,7 +25,7 @@ pub struct FakeTrainer {
     stream: u32,
 }
 
-/// A port on which a trainer waits, and the trainer once somebody comes.
+/// A port on which a trainer waits, and the trainer once a player connects.
 pub fn listen() -> (u16, impl FnOnce() -> FakeTrainer) {
     let listener = TcpListener::bind(("127.0.0.1", 0)).expect("a free port");
     let port = listener.local_addr().expect("an address").port();
@@ -52,7 +52,7 @@ impl FakeTrainer {
         self.reader.get_mut().write_all(&bytes).expect("a player that listens");
     }
 
-    /// The next message; `None` when the player is gone.
+    /// The next message. `None` after the player has gone.
     pub fn receive(&mut self) -> Option<UnityMessage> {
         let mut data = Vec::new();
         loop {
@@ -82,7 +82,7 @@ impl FakeTrainer {
         data.extend((bytes.len() as u32).to_be_bytes());
         data.extend(bytes);
         let stream = self.stream;
-        // in one piece, as gRPC sends what is there already
+        // in one piece, as gRPC sends available data
         let mut bytes = Vec::new();
         put(&mut bytes, HEADERS, END_HEADERS, stream, &[]);
         for chunk in data.chunks(16384) {
@@ -92,7 +92,7 @@ impl FakeTrainer {
         self.reader.get_mut().write_all(&bytes).expect("a player that listens");
     }
 
-    /// Receives the greeting and the question what to do; answers the first with a seed.
+    /// Receives the initial message and the first request. Answers the first with a seed.
     pub fn greet(&mut self, seed: i32, areas: i32) -> UnityMessage {
         let hello = self.receive().expect("a greeting");
         self.answer_greeting(seed, areas);
@@ -100,7 +100,7 @@ impl FakeTrainer {
         hello
     }
 
-    /// Answers the greeting.
+    /// Answers the initial message.
     pub fn answer_greeting(&mut self, seed: i32, areas: i32) {
         let initialization = RlInitializationInput {
             seed,
@@ -148,13 +148,13 @@ fn input(input: UnityInput) -> UnityMessage {
     UnityMessage { header: Some(Header { status: Header::OK }), output: None, input: Some(input) }
 }
 
-/// Says to begin anew.
+/// Sends a reset.
 pub fn reset(side_channel: Vec<u8>) -> UnityMessage {
     let rl = RlInput { command: command::RESET, side_channel, ..Default::default() };
     input(UnityInput { rl: Some(rl), initialization: None })
 }
 
-/// Says what the agents of one behavior shall do.
+/// Sends the actions of one behavior's agents.
 pub fn step(behavior: &str, agents: usize, action: &[f32]) -> UnityMessage {
     let one = AgentAction { continuous_actions: action.to_vec() };
     let list = AgentActionList { value: vec![one; agents] };
@@ -162,7 +162,7 @@ pub fn step(behavior: &str, agents: usize, action: &[f32]) -> UnityMessage {
     input(UnityInput { rl: Some(RlInput { agent_actions, ..Default::default() }), initialization: None })
 }
 
-/// Says what each agent of each behavior shall do, with something over the side channels.
+/// Sends the actions of each behavior's agents, and side channel messages.
 pub fn act(chosen: &[(&str, Vec<Vec<f32>>)], side_channel: Vec<u8>) -> UnityMessage {
     let list = |rows: &Vec<Vec<f32>>| AgentActionList {
         value: rows.iter().map(|row| AgentAction { continuous_actions: row.clone() }).collect(),
@@ -172,7 +172,7 @@ pub fn act(chosen: &[(&str, Vec<Vec<f32>>)], side_channel: Vec<u8>) -> UnityMess
     input(UnityInput { rl: Some(rl), initialization: None })
 }
 
-/// Says goodbye.
+/// Sends the end of the conversation.
 pub fn close() -> UnityMessage {
     UnityMessage { header: Some(Header { status: 400 }), output: None, input: None }
 }

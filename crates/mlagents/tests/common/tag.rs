@@ -1,4 +1,4 @@
-//! A task of two roles: a runner that stays at home, and an opponent that pushes it and decides now and then.
+//! A task of two roles: a runner that stays at home, and an opponent that pushes it and skips decisions.
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
@@ -12,9 +12,9 @@ const RUNNER: Part = Part::named(&PARTS, "runner");
 const OPPONENT: Part = Part::named(&PARTS, "opponent");
 
 marathon_envs::options! {
-    /// Arguments of the task.
+    /// Options of the task.
     pub struct Arguments {
-        /// Decisions of the runner for one of the opponent.
+        /// Decisions of the runner per decision of the opponent.
         period: f64 = 4.0,
         /// Whether the opponent has a role of its own.
         roles: f64 = 1.0,
@@ -27,7 +27,7 @@ marathon_envs::options! {
 #[derive(Clone, Default)]
 pub struct Tag(Arguments);
 
-/// Makes the task known.
+/// Registers the task.
 pub fn register_tag() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| register(Arc::new(Tag::default())).expect("a task that makes sense"));
@@ -109,7 +109,7 @@ impl Agent for Tag {
         for x in &mut *start.qpos {
             *x += start.random.around_zero(0.2);
         }
-        // the opponents of several agents do not decide at once
+        // the opponents of different agents decide at different times
         start.memory[0] = start.random.whole(0, 3) as f64;
     }
 
@@ -151,7 +151,7 @@ impl Agent for Tag {
     }
 }
 
-/// How far two places are apart in the plane, m.
+/// Distance of two positions in the plane, m.
 #[inline(always)]
 fn distance<T: Real>(a: [T; 3], b: [T; 3]) -> T {
     let (x, y) = (a[0] - b[0], a[1] - b[1]);

@@ -7,7 +7,7 @@ use marathon_motion::Clip;
 use marathon_motion::kinematics::Pose;
 use marathon_physics::Model;
 
-/// Joints by name, parent, and the body whose rotation they have, in file order.
+/// Joints by name, parent, and the body that sets their rotation, in file order.
 pub const JOINTS: [(&str, Option<usize>, &str); 19] = [
     ("Hips", None, "butt"),
     ("Spine", Some(0), "lower_waist"),
@@ -42,7 +42,7 @@ pub enum Rest {
     Standing,
     /// Every bone lies along this axis of its own frame.
     Along(DVec3),
-    /// The pelvis is turned about the vertical by this angle, degrees.
+    /// The pelvis is rotated about the vertical by this angle, degrees.
     Twisted(f64),
 }
 

@@ -1,4 +1,4 @@
-//! What the tests share.
+//! Helpers shared by the tests.
 
 #![allow(dead_code)]
 
@@ -21,14 +21,14 @@ pub fn model(name: &str) -> Model {
     Model::from_xml_file(file(&format!("assets/agents/{name}.xml"))).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// A clip that comes with Marathon, by character and name.
+/// One of Marathon's clips, by character and name.
 pub fn shipped(character: &str, name: &str) -> Clip {
     let path = file(&format!("assets/motions/{character}/{name}.motion"));
     let bytes = std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     Clip::parse(&path, &bytes).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Names of all clips of a character that come with Marathon.
+/// Names of all of Marathon's clips of a character.
 pub fn all_shipped(character: &str) -> Vec<String> {
     let folder = file(&format!("assets/motions/{character}"));
     let mut names: Vec<String> = std::fs::read_dir(&folder)
@@ -41,8 +41,8 @@ pub fn all_shipped(character: &str) -> Vec<String> {
     names
 }
 
-/// A smooth motion of a model with a free root, made of sines: it turns, tumbles and moves all its joints. Its period is
-/// 1 s, after which it has traveled by the cycle.
+/// A smooth motion of a model with a free root, composed of sines. It turns, tumbles and moves all joints. Its period
+/// is 1 s, after which it has traveled by the cycle.
 pub fn waves(model: &Model, frames: usize, cycle: Cycle) -> Clip {
     let rows: Vec<Vec<f64>> = (0..frames).map(|i| wave(model, i as f64 / frames as f64, cycle)).collect();
     let about = About { name: "waves".into(), model: model.name.clone(), ..About::default() };
@@ -54,14 +54,14 @@ pub fn waves(model: &Model, frames: usize, cycle: Cycle) -> Clip {
 pub fn wave(model: &Model, time: f64, cycle: Cycle) -> Vec<f64> {
     let angle = std::f64::consts::TAU * time;
     let mut qpos = model.qpos0.clone();
-    // tilts about a slanted axis, and turns by the cycle's yaw on the way
+    // tilts about a slanted axis, and turns by the cycle's yaw
     let tilt = 0.3 * angle.sin();
     let (w, x, y) = ((tilt / 2.0).cos(), 0.6 * (tilt / 2.0).sin(), 0.8 * (tilt / 2.0).sin());
     let (c, s) = ((cycle.yaw * time / 2.0).cos(), (cycle.yaw * time / 2.0).sin());
     let radius = if cycle.yaw.abs() > 1e-9 { cycle.pos[0] / (2.0 * (cycle.yaw / 2.0).sin()) } else { 0.0 };
     let around = cycle.yaw * time;
     if cycle.yaw.abs() > 1e-9 {
-        // along a circle whose chord after a cycle is the cycle's way
+        // along a circle whose chord is the cycle's displacement
         let (a, b) = (cycle.yaw / 2.0, around - cycle.yaw / 2.0);
         qpos[0] = radius * (b.sin() + a.sin());
         qpos[1] = radius * (a.cos() - b.cos());
@@ -93,7 +93,7 @@ fn python() -> PathBuf {
 pub fn oracle(script: &str, input: &Value) -> Value {
     let mut child = Command::new(python())
         .arg(file("tests/oracle").join(script))
-        // MuJoCo leaves a log of its warnings where it runs
+        // MuJoCo writes a log of its warnings to the working directory
         .current_dir(std::env::temp_dir())
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())

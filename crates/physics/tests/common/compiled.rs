@@ -5,7 +5,7 @@ use serde_json::Value;
 
 const TOLERANCE: f64 = 1e-9;
 
-/// Walks what the oracle says: `null` is not compared, `"none"` stands for an absent value.
+/// Compares with the reference values: `null` is not compared, `"none"` stands for an absent value.
 pub fn differ(path: &str, ours: &Value, theirs: &Value, out: &mut Vec<String>) {
     match (ours, theirs) {
         (_, Value::Null) => {}

@@ -1,4 +1,4 @@
-//! Running the oracle scripts from tests, and comparing what they say.
+//! Runs the oracle scripts from tests, and compares their results.
 
 #[allow(dead_code)]
 pub mod compiled;
@@ -50,7 +50,8 @@ pub fn package(name: &str) -> PathBuf {
     PathBuf::from(String::from_utf8(output.stdout).expect("a path").trim())
 }
 
-/// Every model file that is shipped: those of Marathon's agents, and its own of Gymnasium's and dm_control's tasks.
+/// Every shipped model file: those of Marathon's agents, and Marathon's own files of Gymnasium's and dm_control's
+/// tasks.
 #[allow(dead_code)]
 pub fn shipped() -> Vec<PathBuf> {
     let mut paths: Vec<PathBuf> = ["agents", "gymnasium", "dm_control"]

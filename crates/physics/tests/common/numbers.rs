@@ -1,4 +1,4 @@
-//! Comparing numbers so that what is not a number fails.
+//! Comparisons of numbers in which NaN fails.
 
 use serde_json::Value;
 
@@ -8,13 +8,13 @@ pub fn numbers(v: &Value) -> Vec<f64> {
     v.as_array().expect("a list").iter().map(|x| x.as_f64().expect("a number")).collect()
 }
 
-/// The largest of some errors, none of which is negative: 0 if there are none, infinite if one is not a number.
-/// (`fold(0.0, f64::max)` takes NaN for nothing.)
+/// The largest of several nonnegative errors: 0 without any, infinite if one is NaN. (`fold(0.0, f64::max)` ignores
+/// NaN.)
 pub fn largest(errors: impl IntoIterator<Item = f64>) -> f64 {
     errors.into_iter().fold(0.0, |worst, x| if x.is_nan() { f64::INFINITY } else { x.max(worst) })
 }
 
-/// Distance of two vectors, relative to the second or to `floor` if that is larger; infinite if it is not a number.
+/// Distance of two vectors, relative to the second or to `floor` if that is larger. Infinite if it is NaN.
 #[allow(dead_code)]
 pub fn distance(a: &[f64], b: &[f64], floor: f64) -> f64 {
     assert_eq!(a.len(), b.len(), "both sides have the same layout");

@@ -1,4 +1,4 @@
-//! What the tests share.
+//! Helpers shared by the tests.
 
 #![allow(dead_code)]
 
@@ -24,7 +24,7 @@ pub fn shapes() -> (Frame, Camera) {
     (frame, Camera { eye: [0.9, -3.4, 1.5], target: [0.25, 0.0, 0.42], fovy: 38.0 })
 }
 
-/// An empty folder of its own for one test, removed at the end.
+/// An empty folder for one test, removed at the end.
 pub struct Folder(PathBuf);
 
 impl Folder {
