@@ -288,7 +288,7 @@ fn a_full_disk_loses_no_row_and_no_event() {
     let output = shell.args(["-c", &script, program()]).args(words("a")).current_dir(temp.path()).output().unwrap();
     let text = stderr(&output);
     assert_eq!(output.status.code(), Some(1), "{text}");
-    assert!(text.contains("write: File too large") && text.contains("the last whole checkpoint has"), "{text}");
+    assert!(text.contains("write: File too large") && text.contains("the last complete checkpoint has"), "{text}");
     succeed(temp.path(), &["train", "--resume", "a"]);
     assert_eq!(timeless_rows(&run.join("progress.csv")), timeless_rows(&whole.join("progress.csv")));
     assert_eq!(events(&run), events(&whole));
@@ -387,7 +387,7 @@ fn a_full_disk_stops_the_run_and_keeps_the_last_checkpoint() {
     assert_eq!(output.status.code(), Some(1), "{text}");
     // the table or the events, whichever reaches the limit first
     assert!(text.contains("error: a/") && text.contains(": write: File too large"), "{text}");
-    assert!(text.contains("the last whole checkpoint has 40,960") && text.contains("train --resume a"), "{text}");
+    assert!(text.contains("the last complete checkpoint has 40,960") && text.contains("train --resume a"), "{text}");
     assert_eq!(tensors(&run.join("policy.safetensors")), before, "the old policy is whole");
     assert_no_leftovers(&run);
 

@@ -189,7 +189,7 @@ fn a_loop_whose_ends_differ_is_refused() {
     let import = ["motion", "import", "sink.txt", "--model", "MarathonMan", "--out", "a.motion", "--floor", "0"];
     let text = fail(temp.path(), 2, &[&import[..], &["--loop", "wrap"]].concat());
     assert!(
-        text.contains("sink.txt: its ends differ by 0.4") && text.contains("--trim FROM TO chooses them"),
+        text.contains("sink.txt: its ends differ by 0.4") && text.contains("--trim FROM TO selects them"),
         "{text}"
     );
     assert!(!temp.path().join("a.motion").exists());
