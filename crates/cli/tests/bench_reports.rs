@@ -58,8 +58,8 @@ fn physics_takes_model_files_and_threads() {
 
 #[test]
 fn env_counts_decisions() {
-    let rows = check(&json(&["env", "--agent", "hopper", "--isa", "baseline"]), "env", 1);
-    assert_eq!((&rows[0]["lanes"], &rows[0]["frame_skip"]), (&4.into(), &4.into()));
+    let rows = check(&json(&["env", "--agent", "hopper", "--isa", "f32"]), "env", 1);
+    assert_eq!((&rows[0]["lanes"], &rows[0]["frame_skip"]), (&1.into(), &4.into()));
     // random actions fell a hopper within a second, so resets are measured too
     assert!((2.0..100.0).contains(&rows[0]["episode_length"].as_f64().unwrap()), "{rows:?}");
 }

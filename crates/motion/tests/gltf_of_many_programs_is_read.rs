@@ -139,6 +139,17 @@ fn what_does_not_move_the_skeleton_is_not_read() {
 }
 
 #[test]
+fn an_unknown_extension_that_a_file_requires_is_noted() {
+    let (mut document, bytes) = parts(Kind::Float, &[1.2]);
+    let notes = |document: &Value| read("m.glb", &glb(document, &bytes), &Reading::default()).unwrap().notes;
+    document["extensionsRequired"] = json!(["VRMC_vrm", "KHR_texture_basisu"]);
+    assert_eq!(notes(&document), Vec::<String>::new());
+    document["extensionsRequired"] = json!(["ACME_node_motion"]);
+    let note = notes(&document).concat();
+    assert!(note.contains("requires the glTF extension \"ACME_node_motion\""), "{note}");
+}
+
+#[test]
 fn data_lies_within_a_gltf_or_beside_it() {
     let (document, bytes) = parts(Kind::Float, &[1.2]);
     let expected = plain("m.glb", &glb(&document, &bytes));

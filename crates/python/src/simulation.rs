@@ -62,9 +62,9 @@ impl Simulation {
             return Err(error::value("num_agents is 0, expected at least 1"));
         }
         let isa = isa.map(str::parse::<Isa>).transpose().map_err(error::value)?.unwrap_or_else(Isa::best);
-        if !isa.supported() {
+        if let Some(obstacle) = isa.obstacle() {
             let (found, best) = (isa.name(), Isa::best().name());
-            return Err(error::value(format!("this processor cannot run '{found}'; the best it has is '{best}'")));
+            return Err(error::value(format!("cannot run isa '{found}': {obstacle}; the best is '{best}'")));
         }
         let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
         let threads = if threads == 0 { cores().min(num_agents.div_ceil(AGENTS_PER_THREAD)) } else { threads };

@@ -95,11 +95,9 @@ pub fn isas(chosen: &[Isa]) -> Vec<Isa> {
 /// Reads an instruction set of this processor.
 pub fn supported(text: &str) -> Result<Isa, String> {
     let isa: Isa = text.parse()?;
-    if isa.supported() {
-        Ok(isa)
-    } else {
-        let (isa, best) = (isa.name(), Isa::best().name());
-        Err(format!("this processor cannot run '{isa}'; the best it has is '{best}'"))
+    match isa.obstacle() {
+        None => Ok(isa),
+        Some(obstacle) => Err(format!("cannot run '{}': {obstacle}; the best is '{}'", isa.name(), Isa::best().name())),
     }
 }
 

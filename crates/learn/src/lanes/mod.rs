@@ -26,10 +26,10 @@ macro_rules! f32_lanes {
                 type $T = f32;
                 $body
             }
-            _ => {
+            _ => marathon_physics::with_baseline! {
                 type $T = lanes::F32x4;
                 $body
-            }
+            },
         }
     }};
 }

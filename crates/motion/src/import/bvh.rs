@@ -78,7 +78,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recor
     let count = words.number()?;
     let line = words.line;
     if !(1.0..=1e7).contains(&count) || count != count.trunc() {
-        return Err(words.wrong(line, format!("found {count} frames, expected two or more")));
+        return Err(words.wrong(line, format!("found {count} frames, expected a whole number from 2 to 1e7")));
     }
     words.label("Frame Time:")?;
     let dt = words.number()?;

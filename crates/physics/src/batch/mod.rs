@@ -71,7 +71,7 @@ impl Batch {
     /// # Panics
     /// If the processor does not support the instruction set.
     pub fn new(model: &Model, options: &BatchOptions) -> Result<Batch, SimError> {
-        assert!(options.isa.supported(), "this processor has no {}", options.isa.name());
+        assert!(options.isa.supported(), "cannot run {}: {}", options.isa.name(), options.isa.obstacle().unwrap_or(""));
         let (agents, threads) = (options.agents.max(1), options.threads.max(1));
         // one lane gives the same bits without computing unused lanes
         let isa = if agents == 1 && options.isa != Isa::F64 { Isa::F32 } else { options.isa };

@@ -228,7 +228,7 @@ pub enum Isa {
     F64,
     /// One `f32` lane.
     F32,
-    /// Four `f32` lanes without special instructions.
+    /// Four `f32` lanes without special instructions. On x86-64 it needs the feature `baseline`.
     X4,
     /// Eight lanes, AVX2 and FMA.
     X8,
@@ -255,16 +255,25 @@ impl Isa {
             Isa::X16 => 16,
         }
     }
-    /// Whether this processor can run it.
+    /// Whether this processor can run it, and this program has the kernels for it.
     pub fn supported(self) -> bool {
         match self {
-            Isa::F64 | Isa::F32 | Isa::X4 => true,
+            Isa::F64 | Isa::F32 => true,
+            Isa::X4 => cfg!(any(not(target_arch = "x86_64"), feature = "baseline")),
             #[cfg(target_arch = "x86_64")]
             Isa::X8 => F32x8::supported(),
             #[cfg(target_arch = "x86_64")]
             Isa::X16 => F32x16::supported(),
             #[cfg(not(target_arch = "x86_64"))]
             Isa::X8 | Isa::X16 => false,
+        }
+    }
+    /// Why it cannot run here; `None` if it can.
+    pub fn obstacle(self) -> Option<&'static str> {
+        match self {
+            isa if isa.supported() => None,
+            Isa::X4 => Some("this program was built without the feature `baseline`"),
+            _ => Some("this processor does not support it"),
         }
     }
     /// Short name for tables.
@@ -289,6 +298,24 @@ impl std::str::FromStr for Isa {
     }
 }
 
+/// Runs a block for [`Isa::X4`] where its kernels are compiled.
+#[cfg(any(not(target_arch = "x86_64"), feature = "baseline"))]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! with_baseline {
+    ($($body:tt)*) => {{ $($body)* }};
+}
+
+/// The same: no x86-64 processor is fastest with these kernels, which would take a fifth of the time to compile.
+#[cfg(not(any(not(target_arch = "x86_64"), feature = "baseline")))]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! with_baseline {
+    ($($body:tt)*) => {
+        unreachable!("built without the feature `baseline`")
+    };
+}
+
 /// Runs `$body` with the type alias `$T` bound to the lane type of an [`Isa`].
 #[macro_export]
 macro_rules! with_lanes {
@@ -302,10 +329,10 @@ macro_rules! with_lanes {
                 type $T = f32;
                 $body
             }
-            $crate::lanes::Isa::X4 => {
+            $crate::lanes::Isa::X4 => $crate::with_baseline! {
                 type $T = $crate::lanes::F32x4;
                 $body
-            }
+            },
             #[cfg(target_arch = "x86_64")]
             $crate::lanes::Isa::X8 => {
                 type $T = $crate::lanes::F32x8;

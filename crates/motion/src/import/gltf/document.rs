@@ -22,6 +22,34 @@ pub(super) struct Document {
     pub buffer_views: Vec<View>,
     pub buffers: Vec<Buffer>,
     pub extensions: Extensions,
+    pub extensions_required: Vec<String>,
+}
+
+/// Starts of the names of extensions that leave the skeleton's motion as it is: geometry, materials, textures, lights,
+/// metadata and figures. Compressed animations are refused where they are read.
+const HARMLESS: &[&str] = &[
+    "KHR_materials_",
+    "KHR_texture_",
+    "EXT_texture_",
+    "MSFT_texture_",
+    "KHR_lights_",
+    "EXT_lights_",
+    "KHR_mesh_",
+    "EXT_mesh_",
+    "KHR_draco_",
+    "EXT_meshopt_",
+    "KHR_meshopt_",
+    "KHR_xmp",
+    "KHR_animation_pointer",
+    "VRM",
+];
+
+impl Document {
+    /// Required extensions that this reader does not know: they may change what nodes and animations mean.
+    pub fn unknown_extensions(&self) -> impl Iterator<Item = &str> {
+        let required = self.extensions_required.iter().map(String::as_str);
+        required.filter(|name| !HARMLESS.iter().any(|start| name.starts_with(start)))
+    }
 }
 
 #[derive(Default, Deserialize)]

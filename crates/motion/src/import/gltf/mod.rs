@@ -57,7 +57,10 @@ pub fn glb(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
 pub(super) fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recording, MotionError> {
     let wrong = |key: &str, found: String, expected: &str| MotionError::value(path, key, found, expected);
     let (document, blob) = document::read(path, bytes)?;
-    let (chosen, notes) = choose(path, &document, reading.animation.as_deref())?;
+    let (chosen, mut notes) = choose(path, &document, reading.animation.as_deref())?;
+    notes.extend(document.unknown_extensions().map(|name| {
+        format!("the file requires the glTF extension {name:?}, which is not read; look at the clip before you use it")
+    }));
     let mut buffers = Buffers::new(path, &document, blob, reading.beside);
     let tracks = tracks(path, &document, chosen, &mut buffers)?;
     let place = format!("animations[{chosen}]");
