@@ -99,7 +99,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         for action in actions.chunks_exact_mut(2) {
             action.copy_from_slice(&[bend, -bend]);
         }
-        env.step(&actions, &mut step.as_mut())?;
+        env.step(&actions, &mut step)?;
         distance += step.forward.iter().map(|x| f64::from(*x)).sum::<f64>();
         reward += step.reward.iter().map(|x| f64::from(*x)).sum::<f64>();
         falls += step.terminated.iter().filter(|t| **t).count();

@@ -48,7 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for picture in 0..FRAMES {
         for _ in 0..if picture == 0 { 0 } else { decisions_between } {
             let action = policy.act(&step.obs);
-            env.step(&action, &mut step.as_mut())?;
+            env.step(&action, &mut step)?;
             seconds += dt;
             distance += f64::from(step.forward[0]);
         }

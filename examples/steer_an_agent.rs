@@ -27,7 +27,7 @@ fn drive(env: &mut VecEnv, out: &mut Step, decisions: usize) -> Result<f64, Box<
             // the motors push towards the command, and hold against the friction of the wheels
             action.fill((2.0 * (obs[command] - obs[velocity]) + 0.1 * obs[command]).clamp(-1.0, 1.0));
         }
-        env.step(&actions, &mut out.as_mut())?;
+        env.step(&actions, &mut *out)?;
         sum += out.info.iter().map(|error| f64::from(*error)).sum::<f64>() / env.agents() as f64;
     }
     Ok(sum / decisions as f64)

@@ -27,7 +27,7 @@ pub trait Crowd: Send {
     ///
     /// # Errors
     /// If the task fails.
-    fn step(&mut self, actions: &[f32], out: &mut StepMut) -> Result<(), CrowdError>;
+    fn step(&mut self, actions: &[f32], out: StepMut<'_>) -> Result<(), CrowdError>;
     /// The complete state.
     ///
     /// # Errors
@@ -46,7 +46,7 @@ impl Crowd for VecEnv {
         Ok(VecEnv::reset(self, Some(seed), obs)?)
     }
 
-    fn step(&mut self, actions: &[f32], out: &mut StepMut) -> Result<(), CrowdError> {
+    fn step(&mut self, actions: &[f32], out: StepMut<'_>) -> Result<(), CrowdError> {
         Ok(VecEnv::step(self, actions, out)?)
     }
 
@@ -236,7 +236,7 @@ impl Shard for LockstepShard {
         if hall.present * act == hall.actions.len() {
             meeting.attempt(&mut hall, |hall| {
                 let Hall { crowd, actions, out, .. } = hall;
-                crowd.step(actions, &mut out.as_mut())
+                crowd.step(actions, out.into())
             });
             hall.present = 0;
             hall.round += 1;

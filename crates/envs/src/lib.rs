@@ -19,7 +19,7 @@
 //! let mut out = env.buffers();
 //! env.reset(Some(7), &mut out.obs)?;
 //! let actions = vec![0.0; 3 * env.spec().act];
-//! env.step(&actions, &mut out.as_mut())?;
+//! env.step(&actions, &mut out)?;
 //! assert!(out.reward.iter().all(|r| r.is_finite()));
 //! # Ok::<(), marathon_envs::EnvError>(())
 //! ```

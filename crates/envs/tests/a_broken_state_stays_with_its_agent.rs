@@ -21,10 +21,10 @@ fn a_broken_agent_is_quarantined_and_made_whole() {
         qvel[1] = 1e9;
         env.set_state(3, &AgentState { qpos, qvel }).unwrap();
         let mut actions = vec![0.1; 20 * act];
-        healthy.step(&actions, &mut reference.as_mut()).unwrap();
+        healthy.step(&actions, &mut reference).unwrap();
         actions[5 * act + 2] = f32::NAN;
         actions[6 * act] = f32::INFINITY;
-        env.step(&actions, &mut out.as_mut()).unwrap();
+        env.step(&actions, &mut out).unwrap();
 
         for i in 0..20 {
             let broken = [3, 5, 6].contains(&i);
@@ -56,10 +56,10 @@ fn a_broken_agent_may_wait_for_its_reset() {
     env.reset(None, &mut out.obs).unwrap();
     let mut actions = vec![0.0; 4 * act];
     actions[0] = f32::NAN;
-    env.step(&actions, &mut out.as_mut()).unwrap();
+    env.step(&actions, &mut out).unwrap();
     assert_eq!(out.diverged, [true, false, false, false]);
     actions[0] = 0.0;
-    env.step(&actions, &mut out.as_mut()).unwrap();
+    env.step(&actions, &mut out).unwrap();
     assert!(out.obs.iter().all(|x| x.is_finite()));
     let others = out.obs[obs..].to_vec();
     env.reset_agents(&[true, false, false, false], &mut out.obs).unwrap();

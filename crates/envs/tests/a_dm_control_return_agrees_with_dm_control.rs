@@ -195,7 +195,7 @@ fn play(case: &Case, plan: &Plan, theirs: &Json) -> Differences {
     let mut chaotic = vec![false; n];
     for t in 0..DECISIONS {
         let actions: Vec<f32> = plan.actions.iter().flat_map(|episode| episode[t].clone()).collect();
-        env.step(&actions, &mut out.as_mut()).unwrap();
+        env.step(&actions, &mut out).unwrap();
         for i in 0..n {
             let theirs = &theirs["episodes"][i]["steps"][t];
             if chaotic[i] || theirs["chaos"].as_f64().unwrap() > CHAOS {
@@ -231,7 +231,7 @@ fn play_single(case: &Case, plan: &Plan, theirs: &Json) -> Differences {
             actions.extend(&episode[t]);
         }
     }
-    env.step(&actions, &mut out.as_mut()).unwrap();
+    env.step(&actions, &mut out).unwrap();
     let mut found = Differences::default();
     for i in 0..n {
         found.compare(&out, columns, i, &theirs["episodes"][i / DECISIONS]["alone"][i % DECISIONS]);
@@ -390,7 +390,7 @@ fn a_cheetah_settles_as_in_dm_control() {
     }
     let actions = vec![0.0; STARTS * env.spec().act];
     for _ in 0..199 {
-        env.step(&actions, &mut out.as_mut()).unwrap();
+        env.step(&actions, &mut out).unwrap();
     }
     for i in 0..STARTS {
         let state = env.state(i).unwrap();
@@ -439,7 +439,7 @@ fn returns_of_random_play_agree() {
         let (mut totals, mut noise, act) = (vec![0.0; OURS], Noise::new(2), env.spec().act);
         for t in 1..=1000 {
             let actions: Vec<f32> = (0..OURS * act).map(|_| noise.next()).collect();
-            env.step(&actions, &mut out.as_mut()).unwrap();
+            env.step(&actions, &mut out).unwrap();
             assert!(out.reward.iter().all(|r| (0.0..=1.0).contains(r)), "{}", case.name());
             assert!(out.terminated.iter().all(|end| !end), "{}", case.name());
             assert!(out.truncated.iter().all(|end| *end == (t == 1000)), "{}, decision {t}", case.name());

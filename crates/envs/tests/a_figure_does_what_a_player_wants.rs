@@ -33,7 +33,7 @@ fn made(list: &[(&str, &str)]) -> (VecEnv, Step) {
 /// Steps without offsets, so that the servos follow the reference pose.
 fn go(env: &mut VecEnv, step: &mut Step) {
     let actions = vec![0.0; AGENTS * env.spec().act];
-    env.step(&actions, &mut step.as_mut()).unwrap();
+    env.step(&actions, &mut *step).unwrap();
 }
 
 fn told(step: &Step, agent: usize, i: usize) -> f32 {

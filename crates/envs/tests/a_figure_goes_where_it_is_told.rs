@@ -134,7 +134,7 @@ fn the_gait_follows_the_command_and_stays_near_the_body_speed() {
             action(agent, decision, 0.1, row);
         }
         let before = out.obs.clone();
-        env.step(&actions, &mut out.as_mut()).unwrap();
+        env.step(&actions, &mut out).unwrap();
         env.info(&mut info).unwrap();
         for agent in (0..AGENTS).filter(|agent| !over[*agent]).collect::<Vec<_>>() {
             let (was, is) = (row(&before, agent, n), row(&out.obs, agent, n));
@@ -201,7 +201,7 @@ fn the_commanded_direction_turns_as_told_and_rewards_are_their_formula() {
             action(agent, decision, 0.1, row);
         }
         let before = out.obs.clone();
-        env.step(&actions, &mut out.as_mut()).unwrap();
+        env.step(&actions, &mut out).unwrap();
         env.info(&mut info).unwrap();
         for agent in (0..AGENTS).filter(|agent| !over[*agent]).collect::<Vec<_>>() {
             let (was, is) = (row(&before, agent, n), row(&out.obs, agent, n));
@@ -289,7 +289,7 @@ fn adaptive_starts_fit_the_command_and_try_again() {
     let mut out = env.buffers();
     let (mut again, mut ended) = (0, vec![false; agents]);
     for _ in 0..80 {
-        env.step(&vec![0.0; agents * act], &mut out.as_mut()).unwrap();
+        env.step(&vec![0.0; agents * act], &mut out).unwrap();
         for agent in (0..agents).filter(|agent| out.terminated[*agent]) {
             if !std::mem::replace(&mut ended[agent], true) {
                 let state = env.state(agent).unwrap();
@@ -344,7 +344,7 @@ fn episodes_may_start_standing_and_falls_may_have_a_penalty() {
     let actions = vec![1.0; 64 * env.spec().act];
     let mut felled = 0;
     for _ in 0..80 {
-        env.step(&actions, &mut out.as_mut()).unwrap();
+        env.step(&actions, &mut out).unwrap();
         for (down, reward) in out.terminated.iter().zip(&out.reward) {
             felled += usize::from(*down);
             assert!(!down || *reward == -20.0);

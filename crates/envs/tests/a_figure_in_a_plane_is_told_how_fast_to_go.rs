@@ -83,7 +83,7 @@ fn the_reward_is_its_formula() {
                 // four of them have zero actions
                 action(agent, decision, if agent < 4 { 0.0 } else { 1.0 }, row);
             }
-            env.step(&actions, &mut out.as_mut()).unwrap();
+            env.step(&actions, &mut out).unwrap();
             for agent in (0..AGENTS).filter(|agent| !over[*agent]).collect::<Vec<_>>() {
                 let obs: Vec<f64> = out.obs[agent * n..(agent + 1) * n].iter().map(|x| f64::from(*x)).collect();
                 let moving = velocities(&model, &env, agent);
@@ -160,7 +160,7 @@ fn a_jump_that_is_late_costs() {
         // the `jump` and `late` terms
         let mut paid = |env: &mut VecEnv, command: [f64; 2]| {
             (0..AGENTS).for_each(|agent| env.set_command(agent, Some(&command)).unwrap());
-            env.step(&vec![0.0; AGENTS * act], &mut out.as_mut()).unwrap();
+            env.step(&vec![0.0; AGENTS * act], &mut out).unwrap();
             [3, 4].map(|term| {
                 let terms = (0..AGENTS).map(|agent| out.terms[agent * k + term]);
                 terms.fold([f32::MAX, f32::MIN], |[low, high], x| [low.min(x), high.max(x)])
@@ -253,7 +253,7 @@ fn an_adversary_commands() {
                     action(i, decision, 1.0, &mut row[..plain.act]);
                     row[plain.act..].fill([0.1, 0.5, -0.3, -1.0][(i + decision / 7) % 4]);
                 }
-                env.step(&actions, &mut out.as_mut()).unwrap();
+                env.step(&actions, &mut out).unwrap();
                 for i in 0..AGENTS {
                     let (obs, terms) = (&out.obs[n * i..n * (i + 1)], &out.terms[k * i..k * (i + 1)]);
                     let said = f64::from(actions[act * i + plain.act]);

@@ -205,7 +205,7 @@ fn fall_at(env: &mut VecEnv, out: &mut Step, x: &[f64]) {
         env.set_state(i, &state).unwrap();
     }
     let actions = vec![0.0; AGENTS * env.spec().act];
-    env.step(&actions, &mut out.as_mut()).unwrap();
+    env.step(&actions, &mut *out).unwrap();
     assert!(out.terminated.iter().all(|over| *over), "a lying figure has fallen");
 }
 
@@ -227,7 +227,7 @@ fn a_curriculum_rises_and_falls_with_the_way() {
             let force = if x < far { [20.0 * weight / 9.81, 0.0, weight] } else { [0.0, 0.0, -20.0 * weight] };
             env.push(i, 1, force, [0.0; 3]).unwrap();
         }
-        env.step(&actions, &mut out.as_mut()).unwrap();
+        env.step(&actions, &mut out).unwrap();
         env.info(&mut info).unwrap();
         for i in (0..AGENTS).filter(|i| out.terminated[*i]) {
             // 5 % harder after 16 m, 5 % easier after less than 8 m, unchanged in between
@@ -265,7 +265,7 @@ fn a_figure_stands_on_its_ground() {
         }
         let actions = vec![0.0; AGENTS * env.spec().act];
         for _ in 0..150 {
-            env.step(&actions, &mut out.as_mut()).unwrap();
+            env.step(&actions, &mut out).unwrap();
         }
         for i in 0..AGENTS {
             let state = env.state(i).unwrap();
@@ -301,7 +301,7 @@ fn rewards_are_their_formulas() {
                         env.set_state(i, &state).unwrap();
                     }
                 }
-                env.step(&actions, &mut out.as_mut()).unwrap();
+                env.step(&actions, &mut out).unwrap();
                 for i in 0..AGENTS {
                     let obs = &out.obs[n * i..n * (i + 1)];
                     let (state, a) = (env.state(i).unwrap(), &actions[act * i..act * (i + 1)]);
@@ -376,7 +376,7 @@ fn an_episode_ends_where_nothing_happens_any_more() {
     let actions = vec![0.0; AGENTS * env.spec().act];
     let mut ends = [None; AGENTS];
     for decision in 1..=300 {
-        env.step(&actions, &mut out.as_mut()).unwrap();
+        env.step(&actions, &mut out).unwrap();
         for (end, (truncated, terminated)) in ends.iter_mut().zip(out.truncated.iter().zip(&out.terminated)) {
             assert!(!terminated);
             *end = end.or(truncated.then_some(decision));
@@ -412,7 +412,7 @@ fn an_adversary_builds_ahead_of_the_runner() {
             // a different step up or down for each agent
             actions[act * i + act - 1] = 0.1 * (i as f32 - 10.0);
         }
-        env.step(&actions, &mut out.as_mut()).unwrap();
+        env.step(&actions, &mut out).unwrap();
         for i in 0..AGENTS {
             let ground = env.ground(i, 0).unwrap();
             let step = 0.1 * (i as f64 - 10.0);
@@ -429,7 +429,7 @@ fn an_adversary_builds_ahead_of_the_runner() {
         let before: Vec<_> = (0..AGENTS).map(|i| env.ground(i, 0).unwrap()).collect();
         actions.iter_mut().for_each(|a| *a = 0.0);
         actions.chunks_exact_mut(act).for_each(|row| row[act - 1] = 1.0);
-        env.step(&actions, &mut out.as_mut()).unwrap();
+        env.step(&actions, &mut out).unwrap();
         assert!((0..AGENTS).all(|i| env.ground(i, 0).unwrap() == before[i]), "{id}");
         // pushed ahead by more than a meter
         let weight = agent(id).unwrap().model().unwrap().bodies.iter().map(|b| b.mass).sum::<f64>() * 9.81;
@@ -437,7 +437,7 @@ fn an_adversary_builds_ahead_of_the_runner() {
             env.push(i, 1, [2.0 * weight, 0.0, weight], [0.0; 3]).unwrap();
         }
         for _ in 0..(0.5 / spec.dt) as usize {
-            env.step(&actions, &mut out.as_mut()).unwrap();
+            env.step(&actions, &mut out).unwrap();
         }
         let site = n - 19..n;
         for i in 0..AGENTS {
@@ -489,7 +489,7 @@ fn a_reference_runs_over_the_same_ground() {
             let decides = who(&env);
             // actions of a role that does not run have no effect; the other environment gets different ones
             let before: Vec<f64> = (0..AGENTS).map(|i| torso_at(&env, i)).collect();
-            env.step(&actions, &mut out.as_mut()).unwrap();
+            env.step(&actions, &mut out).unwrap();
             for (i, row) in actions.chunks_exact_mut(act).enumerate() {
                 if began[i].is_some() || !decides[0][i] {
                     row[..own].fill(0.7);
@@ -497,7 +497,7 @@ fn a_reference_runs_over_the_same_ground() {
                     row[own..2 * own].fill(-0.7);
                 }
             }
-            other.step(&actions, &mut seen.as_mut()).unwrap();
+            other.step(&actions, &mut seen).unwrap();
             let running: Vec<usize> = (0..AGENTS).filter(|i| !over[*i]).collect();
             if running.is_empty() {
                 break;

@@ -276,7 +276,7 @@ fn play(case: &Case, plan: &Plan, theirs: &Json) -> Differences {
     let mut chaotic = vec![false; n];
     for t in 0..DECISIONS {
         let actions: Vec<f32> = plan.actions.iter().flat_map(|episode| episode[t].clone()).collect();
-        env.step(&actions, &mut out.as_mut()).unwrap();
+        env.step(&actions, &mut out).unwrap();
         for i in 0..n {
             let theirs = &theirs["episodes"][i]["steps"][t];
             if chaotic[i] || theirs["chaos"].as_f64().unwrap() > CHAOS {
@@ -312,7 +312,7 @@ fn play_single(case: &Case, plan: &Plan, theirs: &Json) -> Differences {
             actions.extend(&episode[t]);
         }
     }
-    env.step(&actions, &mut out.as_mut()).unwrap();
+    env.step(&actions, &mut out).unwrap();
     let mut found = Differences::default();
     for i in 0..n {
         found.compare(&env, &out, i, &theirs["episodes"][i / DECISIONS]["alone"][i % DECISIONS]);
@@ -411,7 +411,7 @@ fn actions_far_out_of_range_cost_what_they_cost_in_gymnasium() {
             let mut found = Differences::default();
             for t in 0..DECISIONS {
                 let actions: Vec<f32> = plan.actions.iter().flat_map(|episode| episode[t].clone()).collect();
-                env.step(&actions, &mut out.as_mut()).unwrap();
+                env.step(&actions, &mut out).unwrap();
                 for i in 0..n {
                     let theirs = &answer[0]["episodes"][i]["steps"][t];
                     let own = theirs["reward"].as_f64().unwrap();
@@ -529,7 +529,7 @@ fn returns_of_random_play_agree() {
         let spec = env.spec().clone();
         while playing.contains(&true) {
             let actions: Vec<f32> = (0..OURS * spec.act).map(|i| spec.action_of(i % spec.act, noise.next())).collect();
-            env.step(&actions, &mut out.as_mut()).unwrap();
+            env.step(&actions, &mut out).unwrap();
             for i in 0..OURS {
                 if playing[i] {
                     totals[i] += f64::from(out.reward[i]);

@@ -45,7 +45,7 @@ fn ends(scale: f32, limit: Option<usize>, clip: Option<&str>, isa: Isa) -> [usiz
     for t in 0..900 {
         let mut actions = vec![0.0; AGENTS * 21];
         actions.chunks_mut(21).enumerate().for_each(|(agent, row)| action(agent, t, scale, row));
-        env.step(&actions, &mut out.as_mut()).unwrap();
+        env.step(&actions, &mut out).unwrap();
         for agent in (0..AGENTS).filter(|agent| !over[*agent]).collect::<Vec<_>>() {
             let seen = &out.final_obs[agent * obs..][..obs];
             let feet = ["right_right_foot", "left_left_foot"].into_iter().zip(TOUCHES);

@@ -136,7 +136,7 @@ mod with_arguments {
         assert_eq!(env.spec().options.get("range"), Some(&[-1.0, f64::INFINITY].into()));
         let mut step = env.buffers();
         env.reset(None, &mut step.obs).unwrap();
-        env.step(&[0.5], &mut step.as_mut()).unwrap();
+        env.step(&[0.5], &mut step).unwrap();
         assert_eq!(step.reward, [-0.5]);
     }
 

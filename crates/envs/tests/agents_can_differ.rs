@@ -17,7 +17,7 @@ fn live(env: &mut VecEnv) -> Vec<Vec<f32>> {
     let mut out = env.buffers();
     let actions = vec![0.5; N * env.spec().act];
     for _ in 0..5 {
-        env.step(&actions, &mut out.as_mut()).unwrap();
+        env.step(&actions, &mut out).unwrap();
     }
     out.obs.chunks(env.spec().obs).map(<[f32]>::to_vec).collect()
 }

@@ -189,7 +189,7 @@ fn observations_rewards_and_terminations_agree_with_mujoco() {
             for (agent, row) in row.chunks_exact_mut(act).enumerate() {
                 action(agent, t, SCALES[agent], row);
             }
-            env.step(&row, &mut out.as_mut()).unwrap();
+            env.step(&row, &mut out).unwrap();
             steps.push(out.clone());
         }
         let ahead = &[4, 8, 16][..future as usize];
@@ -265,7 +265,7 @@ fn the_clip_in_the_world_is_the_one_that_rewards_see() {
                 assert!((parts - reported).abs() < 2e-4, "decision {t}: {parts} m, reported {reported}");
                 farthest = farthest.max(butt);
             }
-            env.step(&vec![0.0; 20 * 21], &mut out.as_mut()).unwrap();
+            env.step(&vec![0.0; 20 * 21], &mut out).unwrap();
         }
         let last = env.reference(0).unwrap().unwrap();
         let way = (last[0] - first[0]).hypot(last[1] - first[1]);
@@ -333,7 +333,7 @@ fn adaptive_starts_are_where_the_agent_has_failed() {
         for t in 1..=20 * (stands + 40) {
             let action = |agent: usize| [if t - begun[agent].0 > stands { 1.0 } else { 0.0 }; 21];
             let actions: Vec<f32> = (0..agents).flat_map(action).collect();
-            env.step(&actions, &mut out.as_mut()).unwrap();
+            env.step(&actions, &mut out).unwrap();
             let phases: Vec<f32> = out.info.chunks(3).map(|info| info[2]).collect();
             let ended: Vec<bool> = (0..agents).map(|agent| out.terminated[agent] || out.truncated[agent]).collect();
             env.reset_agents(&ended, &mut out.obs).unwrap();
@@ -371,7 +371,7 @@ fn standing_beside_a_standing_clip_earns_everything_until_it_is_over() {
     let mut out = env.buffers();
     env.reset(Some(1), &mut out.obs).unwrap();
     for t in 1..=40 {
-        env.step(&[0.0; 3 * 21], &mut out.as_mut()).unwrap();
+        env.step(&[0.0; 3 * 21], &mut out).unwrap();
         assert!(out.reward.iter().all(|r| (0.97..=1.0).contains(r)), "decision {t}: {:?}", out.reward);
         assert!(out.truncated.iter().all(|over| *over == (t == 40)), "a clip of one second has 40 decisions");
         assert!(!out.terminated.contains(&true), "no agent has failed");

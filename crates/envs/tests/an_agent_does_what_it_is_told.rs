@@ -143,7 +143,7 @@ fn go_on(
             for (agent, row) in actions.chunks_exact_mut(1).enumerate() {
                 action(agent, decision, 1.0, row);
             }
-            env.step(&actions, &mut out.as_mut()).expect("the arrays fit");
+            env.step(&actions, &mut *out).expect("the arrays fit");
             out.clone()
         })
         .collect()
@@ -365,7 +365,7 @@ fn an_action_becomes_controls_by_the_agents_own_rule() {
         env.context(0).map(|_| 4.0 / 3.0 * std::f64::consts::PI * 0.1_f64.powi(3) * 1000.0).expect("it is there");
     let mut velocity = 0.0;
     for (action, ctrl) in [(1.0, 0.5), (0.0, 0.5), (-1.0, -0.5), (-1.0, -1.0)] {
-        env.step(&[action, 0.0], &mut out.as_mut()).expect("the arrays fit");
+        env.step(&[action, 0.0], &mut out).expect("the arrays fit");
         for _ in 0..2 {
             // the damping is implicit: it acts on the velocity at the end of the step
             velocity = (mass * velocity + 0.01 * 20.0 * ctrl) / (mass + 0.01);

@@ -219,7 +219,7 @@ fn every_helper_is_its_formula() {
             for (agent, row) in actions.chunks_exact_mut(2).enumerate() {
                 action(agent, t, 1.5, row);
             }
-            env.step(&actions, &mut out.as_mut()).unwrap();
+            env.step(&actions, &mut out).unwrap();
             for agent in 0..40 {
                 let state = env.state(agent).unwrap();
                 let place = format!("{}, agent {agent}, decision {t}", isa.name());
@@ -266,11 +266,11 @@ fn failure_and_time_limit_are_the_agents_own() {
         state.qvel.fill(0.0);
         env.set_state(agent, &state).unwrap();
     }
-    env.step(&[0.0; 6], &mut out.as_mut()).unwrap();
+    env.step(&[0.0; 6], &mut out).unwrap();
     assert_eq!(out.terminated, [true, false, false]);
     assert_eq!((out.reward[0], &out.terms[..3]), (-5.0, &[0.0, 0.0, -5.0][..]));
     for t in 2..=30 {
-        env.step(&[0.0; 6], &mut out.as_mut()).unwrap();
+        env.step(&[0.0; 6], &mut out).unwrap();
         assert_eq!(out.truncated[2], t == 30, "decision {t}");
     }
 }

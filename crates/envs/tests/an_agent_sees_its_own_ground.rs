@@ -171,7 +171,7 @@ fn the_observed_ground_supports_the_agent() {
     env.set_state(0, &state).unwrap_or_else(|e| panic!("{e}"));
     let mut out = env.buffers();
     for _ in 0..900 {
-        env.step(&[0.0], &mut out.as_mut()).expect("the arrays fit");
+        env.step(&[0.0], &mut out).expect("the arrays fit");
     }
     let [z, ground] = [out.final_obs[2], out.final_obs[3]];
     // it rests on both slopes, its center higher than its radius by the factor below

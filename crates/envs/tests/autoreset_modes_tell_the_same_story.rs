@@ -86,7 +86,7 @@ fn diary(id: &str, mode: Autoreset, threads: usize) -> Vec<Vec<Event>> {
             env.load(&snapshot).unwrap();
         }
         let before = out.clone();
-        env.step(&diary.actions(&env), &mut out.as_mut()).unwrap();
+        env.step(&diary.actions(&env), &mut out).unwrap();
         for i in 0..AGENTS {
             if mode == Autoreset::NextStep && step > 0 && ended(&before, i) {
                 assert!(!ended(&out, i) && out.reward[i] == 0.0 && out.forward[i] == 0.0 && !out.diverged[i]);
@@ -156,7 +156,7 @@ fn a_state_that_was_set_can_be_observed() {
     let (first, state) = (out.obs.clone(), env.state(17).unwrap());
     let actions = vec![0.5; 18 * env.spec().act];
     for _ in 0..5 {
-        env.step(&actions, &mut out.as_mut()).unwrap();
+        env.step(&actions, &mut out).unwrap();
     }
     env.set_state(17, &state).unwrap();
     let mut mask = vec![false; 18];

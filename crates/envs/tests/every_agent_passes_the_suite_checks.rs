@@ -255,7 +255,7 @@ fn options_that_make_no_sense_are_refused() {
     let mut env = common::make("hopper", 2, 1, None, Autoreset::SameStep);
     let mut out = env.buffers();
     env.reset(None, &mut out.obs).unwrap();
-    let error = env.step(&[0.0; 7], &mut out.as_mut()).unwrap_err().to_string();
+    let error = env.step(&[0.0; 7], &mut out).unwrap_err().to_string();
     assert_eq!(error, "actions [agents][act] has 7 numbers, expected 8");
     assert!(env.state(2).unwrap_err().to_string().contains("expected less than the number of agents"));
 }

@@ -82,7 +82,7 @@ fn fall(figure: Figure, env: &mut VecEnv, step: &mut Step, after: usize) -> Vec<
     for decision in 0..after + 400 {
         let force = if decision < after { figure.carried } else { [0.0; 3] };
         (0..AGENTS).for_each(|agent| env.push(agent, 1, force, [0.0; 3]).unwrap());
-        env.step(&actions, &mut step.as_mut()).unwrap();
+        env.step(&actions, &mut *step).unwrap();
         for agent in (0..AGENTS).filter(|agent| !fallen[*agent]).collect::<Vec<_>>() {
             ways[agent].push(env.state(agent).unwrap());
             fallen[agent] = step.terminated[agent];

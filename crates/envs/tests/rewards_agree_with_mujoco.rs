@@ -49,7 +49,7 @@ fn observations_rewards_and_terminations_agree_with_mujoco() {
             for (agent, row) in row.chunks_exact_mut(act).enumerate() {
                 action(agent, t, SCALES[agent % SCALES.len()], row);
             }
-            env.step(&row, &mut out.as_mut()).unwrap();
+            env.step(&row, &mut out).unwrap();
             steps.push(out.clone());
         }
         request

@@ -67,7 +67,7 @@ fn observation_reward_and_direction_are_those_of_the_page() {
         for (agent, row) in actions.chunks_exact_mut(act).enumerate() {
             action(agent, decision, if agent < 6 { 0.0 } else { 1.0 }, row);
         }
-        env.step(&actions, &mut out.as_mut()).unwrap();
+        env.step(&actions, &mut out).unwrap();
         for i in 0..AGENTS {
             over[i] |= out.terminated[i];
             if over[i] {
@@ -148,7 +148,7 @@ fn on_its_back_it_has_failed() {
     state.qpos[2] = 0.6;
     state.qpos[3..7].copy_from_slice(&[0.0, 1.0, 0.0, 0.0]);
     env.set_state(1, &state).unwrap();
-    env.step(&[0.0; 16], &mut out.as_mut()).unwrap();
+    env.step(&[0.0; 16], &mut out).unwrap();
     assert_eq!((out.terminated[0], out.terminated[1]), (false, true));
     assert_eq!(out.reward[1], -1.0);
 }

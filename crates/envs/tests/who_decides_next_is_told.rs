@@ -59,7 +59,7 @@ fn the_builder_decides_at_starts_and_new_meters() {
             for agent in (0..AGENTS).filter(|agent| agent % 3 != 0) {
                 env.push(agent, TORSO, PUSH, [0.0; 3]).unwrap();
             }
-            env.step(&[0.0; 7 * AGENTS], &mut out.as_mut()).unwrap();
+            env.step(&[0.0; 7 * AGENTS], &mut out).unwrap();
             let ended: Vec<bool> = out.terminated.iter().zip(&out.truncated).map(|(a, b)| *a || *b).collect();
             if autoreset == Autoreset::Disabled {
                 env.reset_agents(&ended, &mut out.obs).unwrap();
@@ -98,7 +98,7 @@ fn all_roles_act_at_starts_and_after_a_load() {
     env.reset(Some(3), &mut out.obs).unwrap();
     let saved = env.save();
     let step = |env: &mut VecEnv, out: &mut marathon_envs::Step| {
-        env.step(&[0.0; 7 * AGENTS], &mut out.as_mut()).unwrap();
+        env.step(&[0.0; 7 * AGENTS], &mut *out).unwrap();
         assert_eq!(decides(env, BUILDER), [false; AGENTS]);
     };
     step(&mut env, &mut out);
@@ -126,7 +126,7 @@ fn a_single_role_always_acts_and_unknown_roles_are_refused() {
     let mut env = VecEnv::new("Hopper-v0", &VecEnvOptions { agents: 3, ..Default::default() }).unwrap();
     let mut out = env.buffers();
     env.reset(Some(1), &mut out.obs).unwrap();
-    env.step(&[0.0; 12], &mut out.as_mut()).unwrap();
+    env.step(&[0.0; 12], &mut out).unwrap();
     assert_eq!(decides(&env, 0), [true; 3]);
     assert!(matches!(env.decides(1, &mut [false; 3]), Err(EnvError::Option { option: "role", .. })));
     assert!(matches!(env.decides(0, &mut [false; 2]), Err(EnvError::Shape { found: 2, expected: 3, .. })));

@@ -159,7 +159,7 @@ fn the_replay_of_a_run_on_a_builders_course_is_the_run_to_the_bit() -> Result<()
     env.reset(None, &mut out.obs)?;
     assert_eq!(env.state(0)?.qpos, recording.qpos(0, 0));
     for frame in 1..recording.frames() {
-        env.step(recording.action(frame, 0), &mut out.as_mut())?;
+        env.step(recording.action(frame, 0), &mut out)?;
         assert_eq!(env.state(0)?.qpos, recording.qpos(frame, 0), "frame {frame}");
         assert_eq!(recording.grounds(frame, 0).map(|fields| &fields[0]), Some(&env.ground(0, 0)?), "frame {frame}");
     }

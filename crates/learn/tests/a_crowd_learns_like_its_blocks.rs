@@ -109,7 +109,7 @@ impl Crowd for Fragile {
     fn reset(&mut self, seed: u64, obs: &mut [f32]) -> Result<(), CrowdError> {
         Crowd::reset(&mut self.0, seed, obs)
     }
-    fn step(&mut self, actions: &[f32], out: &mut StepMut) -> Result<(), CrowdError> {
+    fn step(&mut self, actions: &[f32], out: StepMut<'_>) -> Result<(), CrowdError> {
         self.1 = self.1.checked_sub(1).ok_or("it has had enough")?;
         Crowd::step(&mut self.0, actions, out)
     }

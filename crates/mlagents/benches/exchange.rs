@@ -44,7 +44,7 @@ fn main() {
         whole.push(each(|| {
             player.advance().expect("a decision");
         }));
-        physics.push(each(|| env.step(&actions, &mut out.as_mut()).expect("a decision")));
+        physics.push(each(|| env.step(&actions, &mut out).expect("a decision")));
     }
     player.run().expect("a goodbye");
     trainer.join().expect("the trainer is content");

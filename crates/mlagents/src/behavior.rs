@@ -277,7 +277,7 @@ impl Behavior {
         for face in &self.faces {
             face.act(chosen.get(face.name()), &self.spec, &mut self.actions)?;
         }
-        self.env.step(&self.actions, &mut self.out.as_mut())?;
+        self.env.step(&self.actions, &mut self.out)?;
         let terms = self.spec.reward_terms.len();
         for (i, episode) in self.episodes.iter_mut().enumerate() {
             self.ended[i] = self.out.terminated[i] || self.out.truncated[i];

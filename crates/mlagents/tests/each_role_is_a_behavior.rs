@@ -129,7 +129,7 @@ impl Truth {
     }
 
     fn step(&mut self) {
-        self.env.step(&self.actions, &mut self.out.as_mut()).expect("a decision");
+        self.env.step(&self.actions, &mut self.out).expect("a decision");
         for (i, earned) in self.earned.iter_mut().enumerate() {
             self.ended[i] = self.out.terminated[i] || self.out.truncated[i];
             *earned += self.out.terms[3 * i + 1] + self.out.terms[3 * i + 2];
@@ -253,7 +253,7 @@ fn a_role_that_leaves_is_done() {
             let told: Vec<_> =
                 told.map(|(name, rows)| (name, rows.into_iter().map(|(_, row)| row).collect())).collect();
             trainer.answer(&act(&told, Vec::new()));
-            env.step(&actions, &mut out.as_mut()).expect("a decision");
+            env.step(&actions, &mut out).expect("a decision");
             let over: Vec<bool> = out.terminated.iter().zip(&out.truncated).map(|(a, b)| *a || *b).collect();
             let (mut failed, mut finished) = ([false; AGENTS], [false; AGENTS]);
             env.leaves(0, [&mut failed, &mut finished]).expect("a role");

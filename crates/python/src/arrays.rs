@@ -129,7 +129,7 @@ impl Arrays {
         let mut terminated = writer(py, "terminated", &self.terminated)?;
         let mut truncated = writer(py, "truncated", &self.truncated)?;
         let mut diverged = writer(py, "diverged", &self.diverged)?;
-        let mut out = StepMut {
+        let out = StepMut {
             obs: obs.as_slice_mut()?,
             final_obs: final_obs.as_slice_mut()?,
             reward: reward.as_slice_mut()?,
@@ -140,7 +140,7 @@ impl Arrays {
             truncated: truncated.as_slice_mut()?,
             diverged: diverged.as_slice_mut()?,
         };
-        Ok(py.detach(|| env.step(actions, &mut out)))
+        Ok(py.detach(|| env.step(actions, out)))
     }
 
     /// Lets `f` write to the observations without the GIL. With `keep`, it is a copy that it writes to.

@@ -26,7 +26,7 @@ impl Crowd for PyCrowd {
         Python::attach(|py| copy("obs", &self.env.bind(py).call_method1("reset", (seed,))?, obs)).map_err(Into::into)
     }
 
-    fn step(&mut self, actions: &[f32], out: &mut StepMut) -> Result<(), CrowdError> {
+    fn step(&mut self, actions: &[f32], out: StepMut<'_>) -> Result<(), CrowdError> {
         let result = Python::attach(|py| -> PyResult<()> {
             let env = self.env.bind(py);
             let actions = PyArray1::from_slice(py, actions).reshape([self.agents, self.act])?;

@@ -354,7 +354,7 @@ impl Class {
             let mut shown = vec![0.0; leads * act];
             teacher.act_rows(&seen[..leads * sees.len()], Some(&drawn[..leads * act]), &mut shown);
             actions[..leads * act].copy_from_slice(&shown);
-            env.step(&actions, &mut step.as_mut())?;
+            env.step(&actions, &mut *step)?;
             counts[0] += step.terminated[leads..].iter().filter(|ended| **ended).count();
             counts[1] += n - leads;
         }

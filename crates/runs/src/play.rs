@@ -88,7 +88,7 @@ impl<'a> Play<'a> {
     /// # Errors
     /// If the environments refuse them.
     pub fn step(&mut self) -> Result<&Step, RunError> {
-        self.env.step(&self.actions, &mut self.step.as_mut())?;
+        self.env.step(&self.actions, &mut self.step)?;
         Ok(&self.step)
     }
 

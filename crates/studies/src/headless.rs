@@ -102,7 +102,7 @@ impl World {
                 noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
                 *action = (noise >> 8) as f32 / (1 << 23) as f32 - 1.0;
             }
-            env.step(&actions, &mut step.as_mut())?;
+            env.step(&actions, &mut step)?;
             if let Some((renderer, camera, every)) = view.as_mut().filter(|(_, _, every)| decision % every == 0) {
                 let poses: Vec<Vec<f64>> =
                     (0..COUNT).map(|i| Ok(env.state(i)?.qpos)).collect::<Result<_, StudyError>>()?;

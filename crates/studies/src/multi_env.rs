@@ -111,7 +111,7 @@ fn play(agents: usize, seed: u64) -> Result<f64, StudyError> {
     let actions = vec![0.3f32; agents * env.spec().act];
     let start = Instant::now();
     for _ in 0..DECISIONS {
-        env.step(&actions, &mut step.as_mut())?;
+        env.step(&actions, &mut step)?;
     }
     Ok((DECISIONS * agents) as f64 / start.elapsed().as_secs_f64())
 }

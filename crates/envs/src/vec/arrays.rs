@@ -62,19 +62,20 @@ impl Step {
         self.truncated.copy_from_slice(&from.truncated[rows(1)]);
         self.diverged.copy_from_slice(&from.diverged[rows(1)]);
     }
+}
 
-    /// Borrows all arrays.
-    pub fn as_mut(&mut self) -> StepMut<'_> {
+impl<'a> From<&'a mut Step> for StepMut<'a> {
+    fn from(step: &'a mut Step) -> Self {
         StepMut {
-            obs: &mut self.obs,
-            final_obs: &mut self.final_obs,
-            reward: &mut self.reward,
-            terms: &mut self.terms,
-            info: &mut self.info,
-            forward: &mut self.forward,
-            terminated: &mut self.terminated,
-            truncated: &mut self.truncated,
-            diverged: &mut self.diverged,
+            obs: &mut step.obs,
+            final_obs: &mut step.final_obs,
+            reward: &mut step.reward,
+            terms: &mut step.terms,
+            info: &mut step.info,
+            forward: &mut step.forward,
+            terminated: &mut step.terminated,
+            truncated: &mut step.truncated,
+            diverged: &mut step.diverged,
         }
     }
 }
@@ -102,22 +103,7 @@ pub struct StepMut<'a, O = f32> {
     pub diverged: &'a mut [bool],
 }
 
-impl<'a, O> StepMut<'a, O> {
-    /// Reborrows the arrays.
-    pub(crate) fn borrow(&mut self) -> StepMut<'_, O> {
-        StepMut {
-            obs: self.obs,
-            final_obs: self.final_obs,
-            reward: self.reward,
-            terms: self.terms,
-            info: self.info,
-            forward: self.forward,
-            terminated: self.terminated,
-            truncated: self.truncated,
-            diverged: self.diverged,
-        }
-    }
-
+impl<O> StepMut<'_, O> {
     /// The rows of the first `n` agents, and those of the others.
     pub(crate) fn split_at(self, n: usize, spec: &Spec) -> (Self, Self) {
         let (obs, obs_rest) = self.obs.split_at_mut(n * spec.obs);

@@ -42,7 +42,7 @@ impl Default for VecEnvOptions {
         VecEnvOptions {
             agents: 1,
             seed: 0,
-            threads: 1,
+            threads: 0,
             isa: None,
             autoreset: Autoreset::SameStep,
             max_episode_steps: None,

@@ -218,7 +218,12 @@ impl VecEnv {
     ///
     /// # Errors
     /// If an array's length is wrong. Then nothing has changed.
-    pub fn step<O: ObsNumber>(&mut self, actions: &[f32], out: &mut StepMut<'_, O>) -> Result<(), EnvError> {
+    pub fn step<'a, O: ObsNumber + 'a>(
+        &mut self,
+        actions: &[f32],
+        out: impl Into<StepMut<'a, O>>,
+    ) -> Result<(), EnvError> {
+        let mut out = out.into();
         let (obs, act) = (self.spec.obs, self.spec.act);
         let (terms, infos) = (self.spec.reward_terms.len(), self.spec.info.len());
         self.check("actions [agents][act]", actions.len(), act)?;
@@ -234,13 +239,13 @@ impl VecEnv {
 
         let autoreset = self.autoreset;
         let Some(pool) = &mut self.pool else {
-            self.workers[0].step(autoreset, actions, out);
+            self.workers[0].step(autoreset, actions, &mut out);
             return Ok(());
         };
         let pool = pool.get()?;
         // each worker gets the rows of its own agents
         let (spec, n) = (&self.spec, self.stride);
-        let mut rest = out.borrow();
+        let mut rest = out;
         let mut parts = Vec::with_capacity(self.workers.len());
         for _ in 1..self.workers.len() {
             let (part, others) = rest.split_at(n, spec);

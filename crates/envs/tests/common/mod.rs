@@ -131,7 +131,7 @@ pub fn go_on(env: &mut VecEnv, out: &mut Step, from: usize, to: usize, scale: f3
         for (agent, row) in actions.chunks_exact_mut(act).enumerate() {
             action(agent, decision, scale, row);
         }
-        env.step(&actions, &mut out.as_mut()).expect("the arrays fit");
+        env.step(&actions, &mut *out).expect("the arrays fit");
         each(decision, out);
     }
 }

@@ -212,7 +212,7 @@ impl CharacterBatch {
         match self.engine.get() {
             Engine::Env(env) => {
                 // lengths are right by construction
-                let _ = env.step(&self.action, &mut self.out.as_mut());
+                let _ = env.step(&self.action, &mut self.out);
                 self.obs.copy_from_slice(&self.out.obs);
             }
             Engine::Free(batch, substeps) => {
