@@ -20,6 +20,23 @@ fn a_batch_repeats_itself_from_a_snapshot() {
 }
 
 #[test]
+fn a_backpack_pulls_backward() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = run(env!("CARGO_BIN_EXE_attach_a_backpack"), folder.path(), &[]);
+    let bare = "without a backpack: 40.8 kg, nq 28, nu 21, 28 numbers in the start pose";
+    assert_eq!(out.matches(bare).count(), 2, "{out}");
+    assert!(out.contains("with a backpack: 50.8 kg, nq 29, nu 22, 29 numbers in the start pose"), "{out}");
+    assert!(out.contains("there is no body 'tors'; did you mean 'torso'?"), "{out}");
+    assert!(out.contains("with <motor name=\"strap\"> <accelerometer name=\"backpack\">"), "{out}");
+    let x = |words| {
+        let rest = out.split(words).nth(1).and_then(|rest| rest.split(',').next()).expect("a position");
+        rest.parse::<f64>().expect("a number")
+    };
+    let (without, with) = (x("second without: torso at ["), x("second with: torso at ["));
+    assert!(with < without - 0.1, "{out}");
+}
+
+#[test]
 fn a_custom_agent_creeps_forward() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let out = run(env!("CARGO_BIN_EXE_custom_agent"), folder.path(), &[]);

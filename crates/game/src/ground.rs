@@ -4,10 +4,10 @@
 //! begin as in training.
 
 use marathon_envs::agents::marathon::terrain::course::{FROM, POINTS, TO};
-use marathon_envs::{AnyAgent, Elsewhere, EnvError, Facts, ModelSource, Options, Registry, registry};
-use marathon_physics::budget;
+use marathon_envs::{AnyAgent, Elsewhere, EnvError, ModelSource, Options, Registry, registry};
+use marathon_physics::mjcf::MjcfError;
+use marathon_physics::spec::{ElementRef, Geom, HField, Kind, ModelSpec};
 use std::f64::consts::TAU;
-use std::fmt::Write;
 use std::sync::Arc;
 
 /// Level meters at the start of the track.
@@ -23,8 +23,6 @@ const HALF_WIDTH: f64 = 30.0;
 /// What lies below this is the level ground, m: two surfaces at one height would both carry.
 const SUNK: f64 = 0.01;
 
-/// The floor of the suite's figures.
-const FLOOR: &str = "type=\"plane\" size=\"0 0 1\"";
 /// Half the width of a [`Ground::Track`], and its thickness below the start's height, m.
 pub(crate) const TRACK_HALF_WIDTH: f64 = 8.0;
 const TRACK_BASE: f64 = 8.0;
@@ -112,13 +110,13 @@ impl Ground {
             return Ok(agent);
         }
         let facts = agent.facts();
-        let text = self.laid(&source(&facts)?);
-        let lacks = match self {
-            Ground::Track => "its model has no level floor of its own, which a course could replace",
-            _ => "its model has no <worldbody>, where a ground could lie",
-        };
-        let text = text.ok_or_else(|| wrong(&facts, lacks.into()))?;
-        Ok(Arc::new(Elsewhere::new(agent, ModelSource::from(text))))
+        let refused = |source| EnvError::Model { id: facts.id.clone(), source: Box::new(source) };
+        let mut spec = facts.model.spec(&facts.id).map_err(refused)?;
+        if !self.lay(&mut spec).map_err(refused)? {
+            let problem = "its model has no level floor of its own, which a course could replace";
+            return Err(EnvError::Agent { id: facts.id, problem: problem.into() });
+        }
+        Ok(Arc::new(Elsewhere::new(agent, ModelSource::from(spec))))
     }
 
     /// A registry that has an agent on this ground, and the arguments that are still to be given to it.
@@ -131,59 +129,39 @@ impl Ground {
         Ok((registry, Options::new()))
     }
 
-    /// MJCF with this ground in it; `None` if it has no world.
-    fn laid(self, text: &str) -> Option<String> {
+    /// Lays this ground into a model. `false`: the model has no floor that it could replace.
+    fn lay(self, spec: &mut ModelSpec) -> Result<bool, MjcfError> {
         if self == Ground::Track {
-            return track(text);
+            return lay_track(spec);
         }
-        let world = text.find("<worldbody")?;
-        let world = world + text[world..].find('>')? + 1;
         let points = ((LENGTH + BEHIND) / GRID).round() as usize + 1;
         let heights: Vec<f64> = (0..points).map(|i| self.height(i as f64 * GRID - BEHIND)).collect();
         let top = heights.iter().copied().fold(0.0, f64::max);
-        let mut elevation = String::new();
-        for _row in 0..2 {
-            for height in &heights {
-                // writing to a string cannot fail
-                let _ = write!(elevation, "{height:.4} ");
-            }
-        }
+        // whole tenths of a millimeter
+        let row: Vec<f64> = heights.iter().map(|height| (height * 1e4).round() / 1e4).collect();
         let (half, middle) = (0.5 * (LENGTH + BEHIND), 0.5 * (LENGTH - BEHIND));
         let name = self.name();
+        let field = HField::new(name, 2, points, [half, HALF_WIDTH, top, 0.5]).elevation(&[&row[..], &row].concat());
         // geoms collide if the contype of one meets the conaffinity of the other: 1 is what every agent's geoms have
-        Some(format!(
-            "{}\n<geom name=\"{name}\" type=\"hfield\" hfield=\"{name}\" pos=\"{middle} 0 {}\" contype=\"0\" conaffinity=\"1\" \
-             rgba=\"1 1 1 1\"/>{}<asset><hfield name=\"{name}\" nrow=\"2\" ncol=\"{points}\" \
-             size=\"{half} {HALF_WIDTH} {top} 0.5\" elevation=\"{elevation}\"/></asset>\n</mujoco>\n",
-            &text[..world],
-            -SUNK,
-            text[world..].trim_end().strip_suffix("</mujoco>")?,
-        ))
+        let ground = Geom::hfield(name).name(name).pos([middle, 0.0, -SUNK]).collision(0, 1).rgba([1.0; 4]);
+        spec.add(field)?.add_first_to("world", ground)?;
+        Ok(true)
     }
 }
 
-/// MJCF with a height field in place of the floor, as the assault courses have it; `None` if there is no such floor.
-fn track(text: &str) -> Option<String> {
-    let (before, after) = text.split_once(FLOOR)?;
+/// Puts a height field in place of the floor, as the assault courses have it. `false`: there is no such floor.
+fn lay_track(spec: &mut ModelSpec) -> Result<bool, MjcfError> {
+    let Some(mut floor) = spec.find_mut(Kind::Geom, is_floor) else { return Ok(false) };
     let (half, middle) = (0.5 * (TO - FROM), 0.5 * (TO + FROM));
-    Some(format!(
-        "{before}type=\"hfield\" hfield=\"track\" pos=\"{middle} 0 0\"{}<asset><hfield name=\"track\" nrow=\"2\" \
-         ncol=\"{POINTS}\" size=\"{half} {TRACK_HALF_WIDTH} 1 {TRACK_BASE}\"/></asset>\n</mujoco>\n",
-        after.trim_end().strip_suffix("</mujoco>")?,
-    ))
+    floor.unset("size")?.set("type", "hfield")?.set("hfield", "track")?.set("pos", [middle, 0.0, 0.0])?;
+    spec.add(HField::new("track", 2, POINTS, [half, TRACK_HALF_WIDTH, 1.0, TRACK_BASE]))?;
+    Ok(true)
 }
 
-/// The agent's model as text.
-fn source(facts: &Facts) -> Result<String, EnvError> {
-    match &facts.model {
-        ModelSource::Text(text) => Ok(text.to_string()),
-        ModelSource::File(path) => budget::read_to_string(path, &budget::MODEL_FILE)
-            .map_err(|e| wrong(facts, format!("{}: {e}", path.display()))),
-    }
-}
-
-fn wrong(facts: &Facts, problem: String) -> EnvError {
-    EnvError::Agent { id: facts.id.clone(), problem }
+/// Whether a geom is an infinite level plane at height 0.
+fn is_floor(geom: ElementRef) -> bool {
+    let moved = ["pos", "quat", "axisangle", "euler", "xyaxes", "zaxis"].iter().any(|place| geom.get(place).is_some());
+    geom.get("type") == Some("plane") && geom.numbers("size").is_some_and(|size| size.starts_with(&[0.0; 2])) && !moved
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! MuJoCo's physics, one agent per SIMD lane.
 //!
 //! * [`mjcf`] reads an MJCF file and compiles it to a [`Model`], equal to MuJoCo's.
+//! * [`spec`] edits a model before it is compiled: MuJoCo's `mjSpec`.
 //! * [`Sim`] holds the model's constants in lane precision, [`Group`] the state of as many agents as a vector has lanes,
 //!   [`Work`] the scratch memory of a step. [`Sim::step`] advances a group.
 //! * [`lanes`] has the number type that carries every kernel: `f64`, `f32`, or 4, 8, 16 agents in one vector.
@@ -67,6 +68,7 @@ pub use algebra::spatial::rot_to_quat;
 pub use batch::workload;
 pub use batch::{Batch, BatchOptions, Blowup, BodyReading, Quantity, Replay, Snapshot};
 pub use lanes::{Isa, Real};
+pub use mjcf::spec;
 pub use model::Model;
 pub use readings::{MeasurePlan, Readings};
 pub use sim::{Sim, SimError, SimOptions};

@@ -12,6 +12,7 @@ use common::compiled::differ;
 use common::{oracle, package, workspace};
 use marathon_physics::Model;
 use marathon_physics::mjcf::MjcfErrorKind;
+use marathon_physics::spec::{Actuator, Body, Geom, HField, Joint, Kind, ModelSpec};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -58,6 +59,26 @@ fn marathons_own_agents() {
     if !files.is_empty() {
         compare(&files);
     }
+}
+
+/// What the edit API writes is a model to MuJoCo, too.
+#[test]
+fn edited_models() {
+    let mut spec = ModelSpec::from_xml_file(workspace().join("assets/agents/humanoid.xml")).expect("a model");
+    spec.add_to("torso", Body::new("backpack").pos([-0.15, 0.0, 0.0])).expect("a torso");
+    spec.add_to("backpack", Joint::hinge([0.0, 1.0, 0.0]).name("strap").range([-10.0, 10.0])).expect("a backpack");
+    spec.add_to("backpack", Geom::cuboid([0.08, 0.14, 0.2]).name("backpack").mass(6.0)).expect("a backpack");
+    spec.add(Actuator::position("strap", 20.0).joint("strap").ctrl_range([-1.0, 1.0])).expect("a free name");
+    let gone = spec.remove(Kind::Body, "left_upper_arm").expect("an arm");
+    assert_eq!(gone.len(), 3, "{gone:?}");
+    spec.add(HField::new("hills", 2, 3, [5.0, 5.0, 1.0, 1.0]).elevation(&[0.0, 0.5, 1.0, 0.0, 1.0, 2.0]))
+        .expect("a free name");
+    spec.replace("floor", Geom::hfield("hills").collision(0, 1)).expect("a floor");
+    let file = std::env::temp_dir().join(format!("marathon-edited-{}.xml", std::process::id()));
+    std::fs::write(&file, spec.to_xml()).expect("a file");
+    assert!(Model::from_xml_file(&file).expect("a model") == spec.compile().expect("a model"));
+    compare(std::slice::from_ref(&file));
+    std::fs::remove_file(file).expect("the file is there");
 }
 
 #[test]

@@ -5,7 +5,7 @@ use marathon_physics::lanes::Real;
 use marathon_physics::model::{Actuator, JointType, Model};
 use marathon_physics::{Group, MeasurePlan, Readings, Sim, SimOptions, Work};
 
-use super::{Facts, ModelSource};
+use super::Facts;
 use crate::error::EnvError;
 
 /// Name of the keyframe that holds the start pose and velocity.
@@ -86,11 +86,8 @@ pub(crate) struct Bindings<T: Real> {
 impl Blueprint {
     /// Compiles the model of an agent.
     pub fn model(facts: &Facts) -> Result<Model, EnvError> {
-        let loaded = match &facts.model {
-            ModelSource::Text(text) => Model::from_xml_str(text, &facts.id),
-            ModelSource::File(path) => Model::from_xml_file(path),
-        };
-        loaded.map_err(|source| EnvError::Model { id: facts.id.clone(), source: Box::new(source) })
+        let compiled = facts.model.spec(&facts.id).and_then(|spec| spec.compile());
+        compiled.map_err(|source| EnvError::Model { id: facts.id.clone(), source: Box::new(source) })
     }
 
     pub fn new(facts: &Facts) -> Result<Blueprint, EnvError> {

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use marathon_motion::Clip;
+use marathon_physics::mjcf::MjcfError;
+use marathon_physics::spec::ModelSpec;
 
 use super::{CommandRange, RoleFacts};
 
@@ -116,6 +118,24 @@ impl ModelSource {
             ModelSource::Text(text) => Some(text),
             ModelSource::File(_) => None,
         }
+    }
+
+    /// The model, to edit or compile it. `name` stands for a text in messages.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or the model is not well-formed XML.
+    pub fn spec(&self, name: &str) -> Result<ModelSpec, MjcfError> {
+        match self {
+            ModelSource::Text(text) => ModelSpec::from_xml_str(text, name),
+            ModelSource::File(path) => ModelSpec::from_xml_file(path),
+        }
+    }
+}
+
+/// An edited model as text.
+impl From<ModelSpec> for ModelSource {
+    fn from(spec: ModelSpec) -> Self {
+        spec.to_xml().into()
     }
 }
 

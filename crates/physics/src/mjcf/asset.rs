@@ -48,12 +48,17 @@ pub(crate) fn read<'a>(
 
 /// The name that an asset gives itself, else that of its file without folder and extension.
 fn asset_name(element: &Element) -> Result<&str, MjcfError> {
+    given_name(element).ok_or_else(|| element.invalid("the attribute 'name' is missing"))
+}
+
+/// The same, if there is one.
+pub(crate) fn given_name(element: &Element) -> Option<&str> {
     let given = element.text("name").filter(|n| !n.is_empty());
     let stem = || {
         let file = element.text("file")?.rsplit(['/', '\\']).next()?;
         Some(file.rsplit_once('.').map_or(file, |(stem, _)| stem)).filter(|s| !s.is_empty())
     };
-    given.or_else(stem).ok_or_else(|| element.invalid("the attribute 'name' is missing"))
+    given.or_else(stem)
 }
 
 /// A grid of elevations as it is written down: rows, columns, values.

@@ -5,10 +5,10 @@ use super::room::{ELEMENT, Room};
 use crate::hint::nearest;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
-use std::rc::Rc;
+use std::sync::Arc;
 
 /// Elements may be nested this deep; deeper files would exhaust the stack of whatever walks them.
-const MAX_DEPTH: usize = 200;
+pub(crate) const MAX_DEPTH: usize = 200;
 /// Elements, text pieces and comments per file; keeps memory in proportion.
 const MAX_NODES: u32 = 4_000_000;
 /// Limit on the attributes of an element. The parser compares each with all others.
@@ -17,7 +17,7 @@ const MAX_ATTRIBUTES: usize = 500;
 /// Where something stands: file and line.
 #[derive(Clone, Debug)]
 pub(crate) struct Place {
-    pub file: Rc<str>,
+    pub file: Arc<str>,
     pub line: usize,
 }
 
@@ -97,6 +97,18 @@ impl Room {
     pub fn take_for(&self, element: &Element, count: usize, bytes: usize) -> Result<(), MjcfError> {
         self.take(count, bytes).map_err(|over| element.invalid(format!("the model {over}")))
     }
+
+    /// Takes room for an element without its children. `text`: length of its attributes' values.
+    fn take_element(&self, element: &Element, attributes: usize, text: usize) -> Result<(), MjcfError> {
+        self.take_for(element, 1, ELEMENT)?;
+        self.take_for(element, 1, 100 * attributes + text)
+    }
+
+    /// Takes room for a document that is already parsed.
+    pub fn take_document(&self, root: &Element) -> Result<(), MjcfError> {
+        self.take_element(root, root.attrs.len(), root.attrs.iter().map(|a| a.value.len()).sum())?;
+        root.children.iter().try_for_each(|child| self.take_document(child))
+    }
 }
 
 /// Reads the text of an included file, given the path relative to the main file.
@@ -164,7 +176,7 @@ struct Loader<'a> {
 impl Loader<'_> {
     /// One file; `dir` is its directory relative to the main file, empty or with a trailing slash.
     fn file(&mut self, text: &str, name: &str, dir: &str, depth: usize) -> Result<Element, MjcfError> {
-        let file: Rc<str> = name.into();
+        let file: Arc<str> = name.into();
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let text = &*without_dashes_in_comments(text);
         // no DTD, hence no entity bombs; the parser itself does not recurse over elements
@@ -185,7 +197,7 @@ impl Loader<'_> {
     fn element(
         &mut self,
         node: roxmltree::Node,
-        file: &Rc<str>,
+        file: &Arc<str>,
         lines: &LineIndex,
         dir: &str,
         depth: usize,
@@ -202,8 +214,7 @@ impl Loader<'_> {
             children: Vec::new(),
             place: place(node.range().start),
         };
-        self.room.take_for(&element, 1, ELEMENT)?;
-        self.room.take_for(&element, 1, node.attributes().map(|a| 100 + a.value().len()).sum())?;
+        self.room.take_element(&element, node.attributes().len(), node.attributes().map(|a| a.value().len()).sum())?;
         if depth >= MAX_DEPTH {
             return Err(element.invalid(format!("elements are nested more than {MAX_DEPTH} deep")));
         }

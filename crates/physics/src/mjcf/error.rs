@@ -90,6 +90,16 @@ pub enum MjcfErrorKind {
         /// The most similar existing name.
         nearest: Option<String>,
     },
+    /// An edit names something that the model does not have.
+    #[error("there is no {kind} '{found}'{}", did_you_mean(.nearest.as_ref()))]
+    NotFound {
+        /// What was looked for: `body`, `geom`, `section`...
+        kind: String,
+        /// The name given.
+        found: String,
+        /// The most similar existing name.
+        nearest: Option<String>,
+    },
     /// The element contradicts itself or the rest of the model.
     #[error("{element}: {message}")]
     Invalid {

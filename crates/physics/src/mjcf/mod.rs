@@ -10,7 +10,7 @@
 //! supported, `defaults` lays classes under elements, `tree` reads the bodies, `inertia` gives them mass,
 //! `asset`, `tendon`, `equality`, `actuator`, `sensor` and `custom` read the rest, `assemble` puts the [`Model`] together,
 //! `mass_matrix` (with `factor`) and `statistics` compute what follows from the reference configuration. `room` counts the memory
-//! that all of them ask for.
+//! that all of them ask for. [`spec`] edits the document before it is compiled.
 //!
 //! What changes the dynamics and is not supported is an error with file and line, never skipped.
 
@@ -38,6 +38,7 @@ mod schema;
 mod sensor;
 mod settings;
 mod solver_params;
+pub mod spec;
 mod statistics;
 mod tendon;
 mod tree;
@@ -47,8 +48,8 @@ pub use error::{MjcfError, MjcfErrorKind};
 
 use crate::budget::{self, MODEL_FILE};
 use crate::model::Model;
-use room::Room;
-use std::path::{Path, PathBuf};
+use spec::ModelSpec;
+use std::path::Path;
 
 impl Model {
     /// Reads and compiles a model file.
@@ -60,15 +61,7 @@ impl Model {
     /// The file or an included one cannot be read, is not a valid, supported model, or asks for more than the
     /// [budget] allows.
     pub fn from_xml_file(path: impl AsRef<Path>) -> Result<Model, MjcfError> {
-        let path = path.as_ref();
-        let shown = path.display().to_string();
-        let text = read(path).and_then(utf8).map_err(|reason| MjcfError {
-            file: shown.clone(),
-            line: 0,
-            kind: MjcfErrorKind::Read(reason),
-        })?;
-        let dir: PathBuf = path.parent().map(Path::to_owned).unwrap_or_default();
-        Self::from_xml_str_with(&text, &shown, &|file| read(&dir.join(file)))
+        ModelSpec::from_xml_file(path)?.compile()
     }
 
     /// Compiles a model given as text, without other files. `name` stands for the file in messages.
@@ -77,7 +70,7 @@ impl Model {
     ///
     /// The text is not a valid, supported model.
     pub fn from_xml_str(xml: &str, name: &str) -> Result<Model, MjcfError> {
-        Self::from_xml_str_with(xml, name, &|_| Err("a model given as text has no other files".to_owned()))
+        ModelSpec::from_xml_str(xml, name)?.compile()
     }
 
     /// Compiles a model given as text. `resolve` returns the content of an included file or a height field, given its
@@ -91,9 +84,7 @@ impl Model {
         name: &str,
         resolve: &dyn Fn(&str) -> Result<Vec<u8>, String>,
     ) -> Result<Model, MjcfError> {
-        let room = Room::default();
-        let root = document::parse(xml, name, &|file| utf8(resolve(file)?), &room)?;
-        assemble::compile(&root, resolve, &room)
+        ModelSpec::from_xml_str_with(xml, name, resolve)?.compile_with(resolve)
     }
 }
 

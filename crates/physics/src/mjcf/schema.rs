@@ -400,6 +400,31 @@ pub(crate) fn check(root: &Element) -> Result<(), MjcfError> {
     root.children.iter().try_for_each(|child| element(child, root, TOP))
 }
 
+/// Checks the names of one element, given the way to it from the root. With `inside` it also checks what the element contains.
+pub(crate) fn check_at(root: &Element, path: &[usize], inside: bool) -> Result<(), MjcfError> {
+    let Some((last, above)) = path.split_last() else { return Ok(()) };
+    let (mut parent, mut rules) = (root, TOP);
+    for step in above {
+        parent = &parent.children[*step];
+        rules = match rules.iter().find(|r| r.name == parent.name).map(|r| &r.inside) {
+            Some(Inside::Rules(inner)) => inner,
+            Some(Inside::Bodies) => BODY,
+            _ => &[],
+        };
+    }
+    let child = &parent.children[*last];
+    match rules.iter().find(|r| r.name == child.name) {
+        _ if parent.name == "default" => default(child, parent),
+        Some(rule) if !inside => checked(child, rule, ""),
+        _ => element(child, parent, rules),
+    }
+}
+
+/// Names of the sections that a model can have.
+pub(crate) fn section_names() -> impl Iterator<Item = &'static str> {
+    TOP.iter().map(|rule| rule.name)
+}
+
 fn element(element: &Element, parent: &Element, rules: &'static [Rule]) -> Result<(), MjcfError> {
     let Some(rule) = rules.iter().find(|r| r.name == element.name) else {
         return Err(unknown_element(element, parent, rules.iter().map(|r| r.name)));

@@ -1,19 +1,13 @@
 //! Actuators that apply no force: the actions of a role without a body.
 
-use std::fmt::Write;
+use marathon_physics::mjcf::MjcfError;
+use marathon_physics::spec::{Actuator, ModelSpec, Tendon};
 
-/// MJCF of motors with these names. They act on a tendon that exerts no force on `joint`.
-pub(super) fn actuators(joint: &str, names: &[&str]) -> String {
-    let mut out =
-        format!("<tendon><fixed name=\"idle\"><joint joint=\"{joint}\" coef=\"0\"/></fixed></tendon>\n<actuator>");
+/// Adds motors with these names after the model's own. They act on a tendon that exerts no force on `joint`.
+pub(super) fn add_actuators<S: AsRef<str>>(spec: &mut ModelSpec, joint: &str, names: &[S]) -> Result<(), MjcfError> {
+    spec.add(Tendon::fixed("idle").joint(joint, 0.0))?;
     for name in names {
-        // writing to a string cannot fail
-        let _ = write!(out, "<motor name=\"{name}\" tendon=\"idle\" ctrllimited=\"true\" ctrlrange=\"-1 1\"/>");
+        spec.add(Actuator::motor(name.as_ref()).tendon("idle").ctrl_range([-1.0, 1.0]))?;
     }
-    out + "</actuator>\n"
-}
-
-/// The model with additional elements.
-pub(super) fn extended(model: &str, elements: &str) -> String {
-    format!("{}{elements}</mujoco>\n", model.trim_end().trim_end_matches("</mujoco>"))
+    Ok(())
 }

@@ -1,15 +1,15 @@
 //! The character's parts, joints and motors, and its model for each kind of control.
 
 use marathon_physics::Model;
+use marathon_physics::mjcf::MjcfError;
+use marathon_physics::spec::{Actuator, Kind, ModelSpec};
 
 use super::super::imitation::Anatomy;
-use crate::agent::Part;
 use crate::agent::options::Choice;
+use crate::agent::{ModelSource, Part};
 
 /// The model with motors.
 const MODEL: &str = include_str!("../../../../../../assets/agents/marathon_man.xml");
-/// The original's drive in the defaults of the model, in addition to the motors.
-const DRIVE: &str = r#"damping="1" stiffness="1" "#;
 
 /// The tracked parts, in the original's order.
 pub const PARTS: [&str; 17] = [
@@ -155,35 +155,37 @@ impl Choice for Control {
 }
 
 /// The model with the actuators for a kind of control.
-pub fn model(control: Control) -> String {
-    if control == Control::Torque {
-        return MODEL.into();
+pub fn model(control: Control) -> ModelSource {
+    match control {
+        Control::Torque => MODEL.into(),
+        _ => servos(control).expect("the figure has a motor for each joint").into(),
     }
-    let without_drive = MODEL.replace(DRIVE, "");
-    let (head, rest) = without_drive.split_once("<actuator>").expect("the model has actuators");
-    let (_, tail) = rest.split_once("</actuator>").expect("the section ends");
-    let mut text = format!("{head}<actuator>\n");
+}
+
+/// The figure with servos in place of its motors, and without the original's drive, which stands by these.
+fn servos(control: Control) -> Result<ModelSpec, MjcfError> {
+    let mut spec = ModelSpec::from_xml_str(MODEL, "marathon_man")?;
+    spec.default_mut("main", "joint")?.unset("damping")?.unset("stiffness")?;
     let ranges = (control == Control::PdRange).then(middles_and_halves);
     for i in ACTIONS {
         let Joint { name, stiffness, strength, original, .. } = &JOINTS[i];
-        let damping = DAMPING_TIME * stiffness;
-        let law = match control {
+        spec.remove(Kind::Actuator, name)?;
+        let servo = Actuator::general(name).joint(name).set("biastype", "affine");
+        spec.add(match control {
             // the drive has a spring and a damper of 1; its force limit is the author's 2.5 times the strength
             Control::Servo => {
                 let bound = 2.5 * original;
-                format!(r#"gainprm="{original}" biasprm="0 -1 -1" forcerange="-{bound} {bound}""#)
+                servo.set("gainprm", *original).set("biasprm", [0.0, -1.0, -1.0]).force_range([-bound, bound])
             }
             _ => {
                 let [middle, reach] = ranges.as_ref().map_or([0.0, 1.0], |ranges| ranges[i]);
                 let (gain, bias) = (stiffness * reach, stiffness * middle);
-                format!(
-                    r#"gainprm="{gain}" biasprm="{bias} -{stiffness} -{damping}" forcerange="-{strength} {strength}""#
-                )
+                let law = servo.set("gainprm", gain).set("biasprm", [bias, -stiffness, -(DAMPING_TIME * stiffness)]);
+                law.force_range([-strength, *strength])
             }
-        };
-        text += &format!("    <general name=\"{name}\" joint=\"{name}\" biastype=\"affine\" {law}/>\n");
+        })?;
     }
-    text + "  </actuator>" + tail
+    Ok(spec)
 }
 
 /// Middle of each joint's range and half its width, rad.
@@ -203,7 +205,7 @@ mod tests {
     #[test]
     fn joints_and_motors_are_the_models() {
         for control in [Control::Pd, Control::PdRange, Control::Torque, Control::Servo] {
-            let model = Model::from_xml_str(&super::model(control), "marathon_man").unwrap();
+            let model = super::model(control).spec("marathon_man").and_then(|spec| spec.compile()).unwrap();
             let names: Vec<&str> = model.joints[1..].iter().map(|joint| joint.name.as_str()).collect();
             assert_eq!(names, JOINTS.each_ref().map(|joint| joint.name));
             for (actuator, joint) in model.actuators.iter().zip(ACTIONS) {

@@ -154,7 +154,7 @@ impl Agent for Controller {
             summary:
                 "a figure of 21 motors: walk and run as commanded, jump, backflip and get up, in the style of clips"
                     .into(),
-            model: model(Control::Pd).into(),
+            model: model(Control::Pd),
             frame_skip: FRAME_SKIP,
             max_episode_steps: decisions(Seconds(SECONDS)),
             observation: Some(OBSERVATION + 4 + 3 + 3 + SKILLS.len() + 7 + 7 + JOINTS.len()),

@@ -164,7 +164,7 @@ impl Agent for MarathonMan {
         Facts {
             id: self.id.into(),
             summary: self.summary.into(),
-            model: model(*control).into(),
+            model: model(*control),
             frame_skip: FRAME_SKIP,
             max_episode_steps: self.max_episode_steps(),
             observation: Some(89 + FUTURE_FRAME * future),

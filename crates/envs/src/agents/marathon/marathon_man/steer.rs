@@ -441,7 +441,7 @@ impl Agent for Steer {
         Facts {
             id: "MarathonManSteer-v0".into(),
             summary: "a figure of 21 motors: walk, run, turn and stand as commanded, in the style of clips".into(),
-            model: model(self.arguments.control).into(),
+            model: model(self.arguments.control),
             frame_skip: FRAME_SKIP,
             max_episode_steps: decisions(self.arguments.seconds),
             observation: Some(OBSERVATION),

@@ -27,6 +27,8 @@ pub use arguments::TerrainArguments;
 pub use runners::Runner;
 
 use marathon_physics::lanes::Real;
+use marathon_physics::mjcf::MjcfError;
+use marathon_physics::spec::{HField, Kind as Element, ModelSpec};
 
 use super::FASTEST;
 use super::ant::AntV0;
@@ -120,20 +122,16 @@ impl<F: Runner> Terrain<F> {
     }
 
     /// The figure's model with a height field in place of the floor.
-    fn model(&self) -> String {
-        const FLOOR: &str = "type=\"plane\" size=\"0 0 1\"";
-        let own = self.figure.facts().model;
-        let text = own.text().expect("the figures' models are texts");
+    fn model(&self) -> Result<ModelSpec, MjcfError> {
+        let mut spec = self.figure.facts().model.spec(F::ID)?;
+        if self.built() {
+            idle::add_actuators(&mut spec, F::JOINT, &self.others())?;
+        }
         let (half, middle) = (0.5 * (TO - FROM), 0.5 * (TO + FROM));
-        let course = format!("type=\"hfield\" hfield=\"course\" pos=\"{middle} 0 0\"");
-        let others = self.others();
-        let others: Vec<&str> = others.iter().map(String::as_str).collect();
-        let idle = if self.built() { idle::actuators(F::JOINT, &others) } else { String::new() };
-        let (width, rows) = (F::HALF_WIDTH, Self::ROWS);
-        let field = format!(
-            "{idle}<asset><hfield name=\"course\" nrow=\"{rows}\" ncol=\"{POINTS}\" size=\"{half} {width} 1 {BASE}\"/></asset>\n"
-        );
-        idle::extended(&text.replacen(FLOOR, &course, 1), &field)
+        spec.add(HField::new("course", Self::ROWS, POINTS, [half, F::HALF_WIDTH, 1.0, BASE]))?;
+        let mut floor = spec.get_mut(Element::Geom, "floor")?;
+        floor.unset("size")?.set("type", "hfield")?.set("hfield", "course")?.set("pos", [middle, 0.0, 0.0])?;
+        Ok(spec)
     }
 
     /// Whether an adversary builds the ground.
@@ -268,7 +266,7 @@ impl<F: Runner> Agent for Terrain<F> {
         Facts {
             id: F::ID.into(),
             summary: F::SUMMARY.into(),
-            model: self.model().into(),
+            model: self.model().expect("the figures' models have a floor").into(),
             observation: None,
             actions,
             reward_terms: terms,
