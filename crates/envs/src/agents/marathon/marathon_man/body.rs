@@ -162,7 +162,7 @@ pub fn model(control: Control) -> ModelSource {
     }
 }
 
-/// The figure with servos in place of its motors, and without the original's drive, which stands by these.
+/// The model with servos in place of its motors, and without the original's drive, which they replace.
 fn servos(control: Control) -> Result<ModelSpec, MjcfError> {
     let mut spec = ModelSpec::from_xml_str(MODEL, "marathon_man")?;
     spec.default_mut("main", "joint")?.unset("damping")?.unset("stiffness")?;
