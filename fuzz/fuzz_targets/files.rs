@@ -116,7 +116,7 @@ fn run() -> PathBuf {
         let task = Setting::named("hopper").unwrap();
         let file = marathon_runs::RunFile::new(&task, &marathon_config::default_for("hopper"));
         let made = RunFolder::create(Some(&run), "hopper").unwrap();
-        made.begin(&file, &task.clips).unwrap();
+        made.begin(&file).unwrap();
         run
     })
     .clone()

@@ -24,6 +24,7 @@ The import registers every task with Gymnasium in the namespace `marathon_envs`:
 
 from marathon_envs import registration
 from marathon_envs._native import (
+    Clip,
     CommandRange,
     Model,
     Policy,
@@ -45,6 +46,7 @@ from marathon_envs.tolerance import Tolerance
 from marathon_envs.vector import MarathonVectorEnv
 
 __all__ = [
+    "Clip",
     "CommandRange",
     "MarathonAgent",
     "MarathonEnv",

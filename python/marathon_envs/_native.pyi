@@ -11,6 +11,7 @@ import numpy.typing as npt
 from marathon_envs.agents import MarathonAgent
 
 __all__ = [
+    "Clip",
     "CommandRange",
     "Model",
     "Player",
@@ -21,6 +22,7 @@ __all__ = [
     "TrainResult",
     "VecEnv",
     "__version__",
+    "_clip",
     "_policy",
     "_spec",
     "evaluate",
@@ -33,6 +35,52 @@ __all__ = [
 ]
 
 __version__: str
+
+@final
+class Clip:
+    """A motion clip as a value of the option ``clip``: ``VecEnv("MarathonMan-v0", clip=clip)``."""
+
+    def __new__(
+        cls,
+        model: Model,
+        qpos: npt.ArrayLike,
+        dt: float,
+        *,
+        name: str = "clip",
+        cycle: tuple[float, float, float] | None = None,
+    ) -> Clip:
+        """Create a clip from the configurations of its frames.
+
+        Args:
+            model: the model that moves.
+            qpos: configurations, ``(n, nq)``.
+            dt: seconds between frames.
+            name: name of the clip. Its ending becomes ``.motion``.
+            cycle: move of one lap along x and y, m, and its turn to the left, rad. Without it, the clip does not loop.
+        """
+    @staticmethod
+    def load(path: str | PathLike[str], /) -> Clip:
+        """Read a ``.motion`` file."""
+    @property
+    def name(self) -> str:
+        """Name in options, run folders and policies, such as ``jump.motion``."""
+    @property
+    def dt(self) -> float:
+        """Seconds between frames."""
+    @property
+    def duration(self) -> float:
+        """Length of the clip, or of one lap if it loops, s."""
+    @property
+    def cycle(self) -> tuple[float, float, float] | None:
+        """Move of one lap along x and y, m, and its turn to the left, rad; None if the clip does not loop."""
+    @property
+    def qpos(self) -> npt.NDArray[np.float64]:
+        """Configurations of the frames, ``(n, nq)``."""
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write a ``.motion`` file."""
+    def __eq__(self, other: object, /) -> bool: ...
+
+def _clip(name: str, bytes: bytes) -> Clip: ...
 
 @final
 class CommandRange:
@@ -104,7 +152,7 @@ class Spec:
     def command(self) -> list[CommandRange]:
         """What agents can be told to do, a number each, see `VecEnv.set_command`."""
     @property
-    def options(self) -> dict[str, bool | float | tuple[float, float] | str]:
+    def options(self) -> dict[str, bool | float | tuple[float, float] | str | Clip | list[str | Clip]]:
         """Arguments that the task takes, with the values that it has."""
     @property
     def nq(self) -> int:
@@ -337,6 +385,9 @@ class Policy:
     def dt(self) -> float:
         """Seconds between two actions."""
     @property
+    def options(self) -> dict[str, bool | float | tuple[float, float] | str | Clip | list[str | Clip]]:
+        """Arguments of the task: ``VecEnv(policy.task, **policy.options)`` is what the policy was trained in."""
+    @property
     def meta(self) -> dict[str, Any]:
         """All that the file says of the policy: network, training with its configuration, evaluation."""
     def __call__(self, obs: npt.ArrayLike, rng: np.random.Generator | int | None = None) -> npt.NDArray[np.float32]:
@@ -403,7 +454,7 @@ def train(
         out: a new folder for everything that the command ``marathon train`` writes; None means that nothing is written.
         resume: the folder of a run to go on with, in place of a configuration; the task is needed for a class alone.
         players: an object that has the rollouts played elsewhere, as `marathon_envs.ray.Workers` does.
-        options: arguments of a task with a name, such as ``{"clip": "my.bvh"}``.
+        options: arguments of a task with a name, such as ``{"clip": "my.bvh"}``. A clip may also be a `Clip`, or a list.
         initialize_from: a policy to start from in place of random weights, a file or the folder of a run, whose hidden
             layers are no wider; it may observe less.
     """

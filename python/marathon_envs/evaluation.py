@@ -53,7 +53,7 @@ def evaluate(
         if not isinstance(policy, Policy):
             raise TypeError("task is missing: a function does not tell which task it is for")
         task = policy.task
-        options = {**policy.meta.get("options", {}), **options}
+        options = {**policy.options, **options}
     agents = min(episodes, MOST_AGENTS)
     env = _tasks.vec_env(task, agents, threads=threads, autoreset="same_step", **options)
     # agent i plays episodes i, i + agents, ...

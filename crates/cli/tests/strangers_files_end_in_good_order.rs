@@ -7,7 +7,6 @@ use common::*;
 use marathon_envs::options::{Options, Value};
 use marathon_learn::{Policy, PolicyMeta};
 use marathon_runs::Setting;
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -16,7 +15,7 @@ fn policy(folder: &Path, agent: &str, options: &[(&str, Value)], change: impl Fn
     let spec = Setting::named(agent).unwrap().factory().unwrap().spec().clone();
     let mut meta = PolicyMeta::of(&spec, vec![4], marathon_learn::Activation::Tanh);
     let all = options.iter().fold(Options::new(), |all, (name, value)| all.with(name, value.clone()));
-    (meta.options, meta.clips) = (all, BTreeMap::new());
+    meta.options = all;
     change(&mut meta);
     let (obs, act) = (meta.obs, meta.act);
     let params = vec![0.0; (obs + 1) * 4 + 5 * act];

@@ -36,9 +36,9 @@ pub mod shard;
 mod vec;
 
 pub use agent::{
-    Agent, Body, CommandRange, Controls, Ctrl, Facts, Following, Frame, ModelSource, Motors, Obs, OptionInfo, Options,
-    Part, ResetNoise, RoleFacts, Senses, Sigmoid, Site, Start, Terms, Tolerance, Value, View, memory, names, options,
-    senses, tolerance,
+    Agent, Body, Clips, CommandRange, Controls, Ctrl, Facts, Following, Frame, ModelSource, Motors, NamedClip, Obs,
+    OptionInfo, Options, Part, ResetNoise, RoleFacts, Senses, Sigmoid, Site, Start, Terms, Tolerance, Value, View,
+    memory, names, options, senses, tolerance,
 };
 pub use any_agent::{AnyAgent, Elsewhere};
 pub use episode_rng::EpisodeRng;

@@ -32,7 +32,7 @@ fn demonstrations(id: &str, isa: Isa) -> Demonstrations {
 #[test]
 fn demonstrations_are_the_observations_of_a_clip() {
     let (id, all) = ("MarathonManSpinKick-v0", demonstrations("MarathonManSpinKick-v0", Isa::F64));
-    let clip = clips::find("spinkick").unwrap();
+    let clip = clips::shipped("spinkick").unwrap();
     let mut env = make(id, 1, 1, Some(Isa::F64), Autoreset::Disabled);
     let (obs_len, dt) = (env.spec().obs, env.spec().dt);
     let rows = (clip.duration() / dt + 1e-9).floor() as usize + 1;

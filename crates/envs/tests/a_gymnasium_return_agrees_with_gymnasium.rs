@@ -80,6 +80,7 @@ fn to_json(value: &Value) -> Json {
         Value::Number(x) => json!(x),
         Value::Pair(x) => json!(x),
         Value::Text(x) => json!(x),
+        Value::Clips(x) => json!(x.to_string()),
     }
 }
 

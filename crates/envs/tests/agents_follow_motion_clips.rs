@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use common::{action, make, oracle, play};
 use marathon_envs::agents::marathon::marathon_man::clips;
-use marathon_envs::{AgentState, Autoreset, Options, VecEnv, VecEnvOptions};
+use marathon_envs::{AgentState, Autoreset, Clips, NamedClip, Options, VecEnv, VecEnvOptions};
 use marathon_motion::kinematics::Pose;
 use marathon_motion::{About, Clip, Cycle};
 use marathon_physics::Model;
@@ -36,7 +36,7 @@ const SCALES: [f32; EPISODES] = [0.0, 0.1, 0.5, 1.3];
 
 /// A clip that ships with the crate.
 fn shipped(name: &str) -> Arc<Clip> {
-    clips::find(name).unwrap_or_else(|| panic!("there is a clip '{name}'"))
+    clips::shipped(name).unwrap_or_else(|| panic!("there is a clip '{name}'"))
 }
 
 /// The walking clip on a circle: each cycle turns to the left.
@@ -137,7 +137,12 @@ fn moments(clip: &Clip, dt: f64, state: &AgentState) -> (usize, Vec<Value>) {
 
 #[test]
 fn observations_rewards_and_terminations_agree_with_mujoco() {
-    clips::add("circling", circling());
+    let circling = NamedClip::from(circling());
+    // the clips with these names, of which one does not come with Marathon
+    let named = |names: &str| -> Clips {
+        let clip = |name| if name == "circling" { circling.clone() } else { NamedClip::shipped(name) };
+        names.split(',').map(clip).collect()
+    };
     let mut request = Vec::new();
     let mut ours = Vec::new();
     let mut played = BTreeSet::new();
@@ -157,7 +162,7 @@ fn observations_rewards_and_terminations_agree_with_mujoco() {
     ] {
         let mut options = Options::new();
         if id == man {
-            options = options.with("clip", clip).with("control", control).with("reward", reward);
+            options = options.with("clip", named(clip)).with("control", control).with("reward", reward);
             options = options.with("future", future as f64);
         }
         let agent = marathon_envs::registry::Registry::default().agent_with(id, &options).unwrap();
@@ -239,10 +244,9 @@ fn observations_rewards_and_terminations_agree_with_mujoco() {
 /// one, over laps that turn, for agents at different positions, with any vector width.
 #[test]
 fn the_clip_in_the_world_is_the_one_that_rewards_see() {
-    clips::add("circling", circling());
     let model = marathon_envs::agent("MarathonMan-v0").unwrap().model().unwrap();
     for isa in [Isa::F64, Isa::best()] {
-        let mut env = follow(&Options::new().with("clip", "circling").with("distance", 1e3), 20, Some(isa));
+        let mut env = follow(&Options::new().with("clip", circling()).with("distance", 1e3), 20, Some(isa));
         let (obs, info) = (env.spec().obs, env.spec().info.len());
         let mut out = env.buffers();
         env.reset(Some(2), &mut out.obs).unwrap();
@@ -315,9 +319,8 @@ fn adaptive_starts_are_where_the_agent_has_failed() {
     let frames = vec![still.frame(0).to_vec(); 100];
     let (about, layout) = (About { name: "stand on".into(), ..still.about().clone() }, still.layout().clone());
     let looping = Clip::new(Path::new("stand on"), about, layout, 0.1, Some(Cycle::default()), &frames).unwrap();
-    clips::add("stand on", looping);
     let (agents, rows) = (64, 400);
-    let mut env = follow(&Options::new().with("clip", "stand on").with("start", "adaptive"), agents, None);
+    let mut env = follow(&Options::new().with("clip", looping).with("start", "adaptive"), agents, None);
     let row = |phase: f32| (phase * rows as f32).round() as usize;
     let places = |env: &VecEnv| -> Vec<usize> {
         let mut info = vec![0.0; agents * 3];
@@ -366,8 +369,7 @@ fn adaptive_starts_are_where_the_agent_has_failed() {
 
 #[test]
 fn standing_beside_a_standing_clip_earns_everything_until_it_is_over() {
-    clips::add("standing", standing());
-    let mut env = follow(&Options::new().with("clip", "standing").with("start", "first"), 3, None);
+    let mut env = follow(&Options::new().with("clip", standing()).with("start", "first"), 3, None);
     let mut out = env.buffers();
     env.reset(Some(1), &mut out.obs).unwrap();
     for t in 1..=40 {
@@ -394,11 +396,11 @@ fn agents_are_where_they_are_in_the_clip_whoever_runs_beside_them() {
 
 #[test]
 fn an_unknown_clip_is_refused() {
-    let refused = |clip: &str| {
+    let refused = |clip: marathon_envs::Value| {
         let options = VecEnvOptions { options: Options::new().with("clip", clip), ..VecEnvOptions::default() };
         VecEnv::new("MarathonMan-v0", &options).map(|_| ()).unwrap_err().to_string()
     };
-    let error = refused("wlak");
+    let error = refused("wlak".into());
     let expected = "option clip is 'wlak', expected a clip that is known; did you mean 'walk'? known: walk, walk_left";
     assert!(error.contains(expected), "{error}");
     let foreign = Clip::new(
@@ -409,7 +411,36 @@ fn an_unknown_clip_is_refused() {
         None,
         &[vec![0.0], vec![0.1]],
     );
-    clips::add("foreign", foreign.unwrap());
-    let error = refused("foreign");
+    let error = refused(foreign.unwrap().into());
     assert!(error.contains("foreign") && error.contains("joint"), "{error}");
+}
+
+/// Each environment follows the clip that it was made with. Neither its name nor what was made before decides.
+#[test]
+fn two_clips_of_one_name_are_followed_side_by_side() {
+    let named = |clip: &str| NamedClip::new("mine", shipped(clip));
+    let env = |clip: NamedClip| follow(&Options::new().with("clip", clip).with("start", "first"), 2, None);
+    let played = |env: &mut VecEnv| {
+        let mut out = env.buffers();
+        env.reset(Some(4), &mut out.obs).unwrap();
+        let action = vec![0.2; 2 * env.spec().act];
+        (0..20).for_each(|_| env.step(&action, &mut out.as_mut()).unwrap());
+        out.obs
+    };
+    let own = |clip: &str| played(&mut follow(&Options::new().with("clip", clip).with("start", "first"), 2, None));
+    let (walk, run) = (own("walk"), own("run"));
+    assert_ne!(walk, run);
+    let (mut first, mut second) = (env(named("walk")), env(named("run")));
+    assert_eq!((played(&mut first), played(&mut second)), (walk.clone(), run));
+    // what an environment says of itself makes it again, whatever has been made since
+    let again = VecEnvOptions { agents: 2, options: first.spec().options.clone(), ..VecEnvOptions::default() };
+    assert_eq!(played(&mut VecEnv::new("MarathonMan-v0", &again).unwrap()), walk);
+    assert_ne!(first.spec().options, second.spec().options);
+    // both in one task, where names are all that tells them apart
+    let both = env_of_both(named("walk"), named("run"));
+    assert_eq!(both.spec().options.get("clip").map(ToString::to_string), Some("'mine.motion,mine-2.motion'".into()));
+}
+
+fn env_of_both(a: NamedClip, b: NamedClip) -> VecEnv {
+    follow(&Options::new().with("clip", [a, b].into_iter().collect::<Clips>()), 2, None)
 }

@@ -417,7 +417,7 @@ fn a_dropped_clip_is_followed_and_a_bad_file_changes_nothing() -> Result<(), Box
     assert_eq!((scenario.agent.as_str(), scenario.mode), ("MarathonMan-v0", Mode::Imitate));
     let mut anatomies = app.world_mut().query_filtered::<&Anatomy, With<Actor>>();
     let spec = anatomies.single(app.world())?.spec.clone().ok_or("a task")?;
-    assert_eq!(spec.options.get("clip"), Some(&"mine.motion".into()));
+    assert!(spec.options.given_clips().contains_key("mine.motion"));
     assert!(ghost_and_body(&mut app).is_some(), "its ghost is there");
     // L learns it
     press(&mut app, Action::Learn);
@@ -430,8 +430,7 @@ fn a_dropped_clip_is_followed_and_a_bad_file_changes_nothing() -> Result<(), Box
         std::thread::sleep(Duration::from_millis(5));
         assert!(begun.elapsed() < Duration::from_secs(240), "no progress");
     };
-    assert_eq!(newest.meta().options.get("clip"), Some(&"mine.motion".into()));
-    assert!(newest.meta().clips.contains_key("mine.motion"), "a policy holds its clip");
+    assert!(newest.meta().options.given_clips().contains_key("mine.motion"), "a policy holds its clip");
     Ok(())
 }
 

@@ -89,7 +89,7 @@ fn in_the_task_that_the_policy_notes() {
     let plain = Setting::named("MarathonMan").expect("the agent exists");
     let setting = plain.clone().with(&TaskOptions { given: given.into() }).expect("arguments that it takes");
     let policy = hardly_trained(&setting);
-    assert_eq!(Setting::of(policy.meta()).clips, setting.clips);
+    assert_eq!(policy.meta().options.get("clip"), setting.options.get("clip"));
     let eval = measure(&setting, &policy);
     compare("MarathonMan", &eval, &play("MarathonMan", policy.clone(), Duration::from_millis(40), |i| i));
     // the file is not needed, and what somebody says goes before what the policy notes
@@ -137,7 +137,6 @@ fn roles_hardly_trained(setting: &Setting) -> (Net, Vec<(String, Net)>) {
         config.network.actor_hidden = vec![8];
     });
     let mut quiet = |_: &IterationStats, _: &Snapshot<'_>| Control::Continue;
-    let mut trained = train(&*factory, Isa::best(), &config, None, &mut quiet).expect("it trains");
-    trained.policy.set_task(factory.spec().options.clone(), setting.clips.clone());
+    let trained = train(&*factory, Isa::best(), &config, None, &mut quiet).expect("it trains");
     (trained.policy, trained.others)
 }

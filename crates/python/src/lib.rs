@@ -5,6 +5,7 @@
 //! Nothing here knows of Gymnasium or another framework.
 
 mod arrays;
+mod clip;
 mod crowd;
 mod error;
 mod model;
@@ -27,9 +28,9 @@ use std::ffi::OsString;
 mod _native {
     #[pymodule_export]
     use super::{
-        crowd::learn, main, model::Model, players::Player, policy::_policy, policy::Policy, policy::evaluate,
-        policy::load_policy, renderer::Renderer, simulation::Simulation, spec::_spec, spec::CommandRange, spec::Spec,
-        spec::ids, spec::spec, train::TrainResult, train::train, vec_env::VecEnv,
+        clip::_clip, clip::Clip, crowd::learn, main, model::Model, players::Player, policy::_policy, policy::Policy,
+        policy::evaluate, policy::load_policy, renderer::Renderer, simulation::Simulation, spec::_spec,
+        spec::CommandRange, spec::Spec, spec::ids, spec::spec, train::TrainResult, train::train, vec_env::VecEnv,
     };
     use pyo3::prelude::*;
 

@@ -1,12 +1,13 @@
 //! Arguments of agents as keyword arguments.
 
+use crate::clip::Clip;
 use crate::error;
 use marathon_envs::options::Value;
-use marathon_envs::{EnvError, Options, registry};
+use marathon_envs::{Clips, EnvError, NamedClip, Options, registry};
 use marathon_runs::Setting;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyList, PyString};
 use std::path::PathBuf;
 
 /// What Python gives for an argument.
@@ -22,6 +23,31 @@ enum Given {
     Text(String),
     #[pyo3(transparent)]
     Path(PathBuf),
+    #[pyo3(transparent)]
+    Clip(Py<Clip>),
+    #[pyo3(transparent)]
+    Clips(Vec<GivenClip>),
+}
+
+/// A clip of several.
+#[derive(FromPyObject)]
+enum GivenClip {
+    #[pyo3(transparent)]
+    Clip(Py<Clip>),
+    #[pyo3(transparent)]
+    Text(String),
+    #[pyo3(transparent)]
+    Path(PathBuf),
+}
+
+impl GivenClip {
+    fn named(self) -> NamedClip {
+        match self {
+            GivenClip::Clip(clip) => clip.get().named(),
+            GivenClip::Text(name) => NamedClip::shipped(name),
+            GivenClip::Path(path) => NamedClip::shipped(path.display().to_string()),
+        }
+    }
 }
 
 /// A task with its arguments; files of clips that they name are read.
@@ -41,6 +67,8 @@ pub fn read(task: &str, given: Option<&Bound<'_, PyDict>>) -> PyResult<Options> 
             Ok(Given::Pair(x)) => Value::Pair(x),
             Ok(Given::Text(x)) => Value::Text(x),
             Ok(Given::Path(x)) => Value::Text(x.display().to_string()),
+            Ok(Given::Clip(x)) => x.get().named().into(),
+            Ok(Given::Clips(x)) => Value::Clips(x.into_iter().map(GivenClip::named).collect::<Clips>()),
             Err(_) => {
                 // whether there is such an argument comes first
                 let tried = registry::global().agent_with(task, &Options::new().with(&name, false));
@@ -60,7 +88,7 @@ pub fn read(task: &str, given: Option<&Bound<'_, PyDict>>) -> PyResult<Options> 
     Ok(options)
 }
 
-/// The same as a dictionary.
+/// The same as a dictionary. Given clips are objects, which make the same task again.
 pub fn show<'py>(py: Python<'py>, options: &Options) -> PyResult<Bound<'py, PyDict>> {
     let table = PyDict::new(py);
     for (name, value) in options.iter() {
@@ -69,7 +97,21 @@ pub fn show<'py>(py: Python<'py>, options: &Options) -> PyResult<Bound<'py, PyDi
             Value::Number(x) => table.set_item(name, x),
             Value::Pair([a, b]) => table.set_item(name, (a, b)),
             Value::Text(x) => table.set_item(name, x),
+            Value::Clips(x) => table.set_item(name, clips(py, x)?),
         }?;
     }
     Ok(table)
+}
+
+/// One clip, or a list of several.
+fn clips<'py>(py: Python<'py>, clips: &Clips) -> PyResult<Bound<'py, PyAny>> {
+    let object = |clip: &NamedClip| match Clip::of(clip) {
+        Some(clip) => Ok(Bound::new(py, clip)?.into_any()),
+        None => Ok(PyString::new(py, clip.name()).into_any()),
+    };
+    let all: Vec<_> = clips.iter().map(object).collect::<PyResult<_>>()?;
+    match &all[..] {
+        [one] => Ok(one.clone()),
+        _ => Ok(PyList::new(py, all)?.into_any()),
+    }
 }

@@ -6,7 +6,7 @@ use crate::{crowd, error, number, options as arguments};
 use marathon_envs::BLOCK;
 use marathon_learn::{BlockPolicy, EvalOptions, evaluate as play};
 use marathon_physics::lanes::Isa;
-use marathon_runs::{Setting, clips, policy_file};
+use marathon_runs::{Setting, policy_file};
 use numpy::{AllowTypeChange, PyArray1, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -43,6 +43,12 @@ impl Policy {
     #[getter]
     fn dt(&self) -> f64 {
         self.0.meta().control_dt
+    }
+
+    /// Arguments of the task: `VecEnv(policy.task, **policy.options)` is what the policy was trained in.
+    #[getter]
+    fn options<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        arguments::show(py, &self.0.meta().options)
     }
 
     /// All that the file says of the policy: network, training with its configuration, evaluation.
@@ -97,7 +103,6 @@ impl Policy {
 #[pyfunction]
 pub fn _policy(bytes: &[u8]) -> PyResult<Policy> {
     let policy = marathon_learn::Policy::from_bytes("policy".as_ref(), bytes).map_err(error::learn)?;
-    clips::name(&policy.meta().clips).map_err(error::run)?;
     Ok(Policy(policy))
 }
 
@@ -109,8 +114,6 @@ pub fn _policy(bytes: &[u8]) -> PyResult<Policy> {
 pub fn load_policy(py: Python<'_>, path: PathBuf, task: Option<Task>) -> PyResult<Policy> {
     let spec = task.map(|task| task.spec(py)).transpose()?;
     let policy = policy_file::read(&path, spec.as_ref()).map_err(error::run)?;
-    // environments of this process can be told to follow them
-    clips::name(&policy.meta().clips).map_err(error::run)?;
     Ok(Policy(policy))
 }
 

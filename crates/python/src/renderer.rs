@@ -33,7 +33,7 @@ impl Renderer {
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let id = task::plain(id);
-        let Setting { agent, options, .. } = options::set(id, options)?;
+        let Setting { agent, options } = options::set(id, options)?;
         let agent = registry::global().agent_with(&agent, &options).map_err(error::env)?;
         Self::with(&agent.model().map_err(error::env)?, width, height, agents)
     }

@@ -3,68 +3,54 @@
 use crate::error::RunError;
 use crate::text::nearest_path;
 use marathon_envs::agents::marathon::marathon_man::clips as known;
+use marathon_envs::options::{OptionValue, Value};
+use marathon_envs::{Clips, NamedClip};
 use marathon_motion::import::{self, Reading};
 use marathon_motion::{About, Clip, Mapping, MotionError, fit, retarget};
 use marathon_physics::Model;
 use marathon_physics::budget::{self, CLIP_FILE, RECORDING_FILE};
 use marathon_physics::hint::did_you_mean;
-use std::collections::BTreeMap;
 use std::path::{Component, Path};
 
 /// Distance, m, and angle, rad, from a recording above which a clip is unsuitable for training.
 const LOST: f64 = 0.15;
 const ASTRAY: f64 = 0.6;
 
-/// Clips that do not ship with Marathon: names, and texts of `.motion` files. Their names end in `.motion`, so they
-/// differ from the names of Marathon's clips.
-pub type Clips = BTreeMap<String, String>;
-
-/// Extension of a clip's file and of its name.
+/// Extension of a clip's file.
 const MOTION: &str = "motion";
 /// Extensions of supported files.
 const ENDINGS: [&str; 8] = [MOTION, "bvh", "glb", "gltf", "vrm", "vrma", "json", "txt"];
 /// Frames per second of a clip from a recording.
 const FPS: f64 = 60.0;
 
-/// Reads the clips in an option's value: names separated by commas, or files. Returns the value with names in place of
-/// files, and adds the clips from files to `clips`.
+/// Reads the clips in an option's value that are files. A name may also be one of the clips in `before`, the option's former
+/// value.
 ///
 /// # Errors
 /// If a file cannot be read, or is not a clip for the model.
-pub fn read_all(argument: &str, agent: &str, model: &Model, clips: &mut Clips) -> Result<String, RunError> {
-    // a file name may contain commas
-    let items: Vec<&str> = match Path::new(argument).is_file() {
-        true => vec![argument],
-        false => argument.split(',').map(str::trim).collect(),
+pub fn read_all(value: &Value, before: Option<&Value>, agent: &str, model: &Model) -> Result<Value, RunError> {
+    let items = match value {
+        // a file name may contain commas
+        Value::Text(text) if Path::new(text).is_file() => Clips::from_iter([NamedClip::shipped(text)]),
+        // the agent refuses other values
+        value => match Clips::read(value) {
+            Some(clips) => clips,
+            None => return Ok(value.clone()),
+        },
     };
-    let mut names = Vec::new();
-    let mut read = Clips::new();
+    let before: Vec<NamedClip> = before.and_then(Clips::read).into_iter().flatten().collect();
+    let mut clips = Clips::default();
     for item in items {
-        let path = Path::new(item);
-        let named = clips.contains_key(item) || known::find(item).is_some();
-        if !is_file_name(path) || (named && !path.is_file()) {
-            names.push(item.to_string());
-            continue;
-        }
-        let text = read_one(path, agent, model)?;
-        let name = free_name(path, &text, &read);
-        read.insert(name.clone(), text);
-        names.push(name);
+        let path = Path::new(item.name());
+        let same = before.iter().find(|clip| clip.name() == item.name() && clip.clip().is_some());
+        clips.push(match same {
+            _ if item.clip().is_some() => item,
+            _ if !is_file_name(path) => item,
+            Some(same) if !path.is_file() => same.clone(),
+            _ => NamedClip::new(&stem(path), read_one(path, agent, model)?),
+        });
     }
-    clips.extend(read);
-    Ok(names.join(","))
-}
-
-/// Registers clips under their names.
-///
-/// # Errors
-/// If a name is not valid for a user's clip, or a text is not a clip.
-pub fn name(clips: &Clips) -> Result<(), RunError> {
-    for (name, text) in clips {
-        check_name(name)?;
-        known::add(name, Clip::parse(Path::new(name), text.as_bytes())?);
-    }
-    Ok(())
+    Ok(clips.into())
 }
 
 /// Refuses a name that would hide one of Marathon's clips, or lead out of a run's folder.
@@ -72,16 +58,14 @@ pub fn name(clips: &Clips) -> Result<(), RunError> {
 /// # Errors
 /// If the name is refused.
 pub fn check_name(name: &str) -> Result<(), RunError> {
-    let path = Path::new(name);
-    let plain = path.file_name().is_some_and(|file| file == name) && !name.contains(['/', '\\', ',']);
-    match plain && ending(path) == MOTION {
+    match NamedClip::file_name(name) == name {
         true => Ok(()),
-        false => Err(RunError::file(path, "name of the clip", name, "a file's name that ends in .motion")),
+        false => Err(RunError::file(name.as_ref(), "name of the clip", name, "a file's name that ends in .motion")),
     }
 }
 
-/// The text of a clip: a `.motion` file as it is, a recording as `marathon motion import` converts it by default.
-fn read_one(path: &Path, agent: &str, model: &Model) -> Result<String, RunError> {
+/// A clip from a `.motion` file, or from a recording as `marathon motion import` converts it by default.
+fn read_one(path: &Path, agent: &str, model: &Model) -> Result<Clip, RunError> {
     if !path.is_file() {
         let near = nearest_path(path, &[], |file| file.is_file() && is_file_name(file));
         return Err(missing(path, &format!("a motion (.{})", ENDINGS.join(", .")), near));
@@ -96,14 +80,13 @@ fn read_one(path: &Path, agent: &str, model: &Model) -> Result<String, RunError>
         }
     };
     clip.check_model(path, model)?;
-    let text = if ending(path) == MOTION { bytes } else { clip.to_bytes() };
-    String::from_utf8(text).map_err(|e| RunError::file(path, "text", e, "UTF-8"))
+    Ok(clip)
 }
 
 /// The error for a path that is neither a file of `what` nor the name of a clip. `near` is a suggestion.
 pub fn missing(path: &Path, what: &str, near: Option<String>) -> RunError {
     let found = if path.is_dir() { "a folder" } else { "no such file" };
-    let (near, names) = (did_you_mean(near), known::all_names().join(", "));
+    let (near, names) = (did_you_mean(near), known::names().join(", "));
     RunError::file(path, "clip", found, format!("a file of {what}{near} or the name of a clip: {names}"))
 }
 
@@ -153,16 +136,6 @@ pub fn beside(recording: &Path, name: &str) -> Result<Vec<u8>, String> {
         return Err(elsewhere());
     }
     budget::read(&file, &RECORDING_FILE).map_err(text)
-}
-
-/// The file's name with the ending `.motion`. It gets a number if another clip has that name.
-fn free_name(path: &Path, text: &str, others: &Clips) -> String {
-    // commas separate names
-    let stem = stem(path).replace(',', "_");
-    let numbered = (2..).map(|i| format!("{stem}-{i}.{MOTION}"));
-    let mut names = std::iter::once(format!("{stem}.{MOTION}")).chain(numbered);
-    let free = |name: &String| others.get(name).is_none_or(|other| other == text);
-    names.find(free).unwrap_or_default()
 }
 
 fn stem(path: &Path) -> String {

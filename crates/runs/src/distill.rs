@@ -11,9 +11,9 @@ use crate::error::RunError;
 #[cfg(feature = "clap")]
 use crate::options::parse_steps;
 use crate::policy_file;
-use crate::setting::{CLIP, Setting, TaskOptions};
-use marathon_envs::options::Value;
-use marathon_envs::{Step, VecEnv, VecEnvOptions, registry};
+use crate::setting::{CLIP, Setting};
+use marathon_envs::options::OptionValue;
+use marathon_envs::{Clips, NamedClip, Step, VecEnv, VecEnvOptions, registry};
 use marathon_learn::{
     Activation, BlockPolicy, Control, Distiller, Error, Halfway, Lessons, Policy, PolicyMeta, can_be_had, checksum,
 };
@@ -261,24 +261,17 @@ impl School {
             lessons_of.push(clips_of(&task, teacher)?);
         }
         // the student's task: all clips of its teachers
-        let mut all: Vec<&str> = Vec::new();
-        for clip in lessons_of.iter().flatten().flat_map(|clips| clips.split(',')) {
-            // a teacher may be listed twice to give it more weight
-            if !all.contains(&clip) {
-                all.push(clip);
-            }
-        }
-        let whole = if all.is_empty() { task.clone() } else { follow(&task, &all.join(","))? };
+        let whole = together(&lessons_of).map_or(task.clone(), |clips| follow(&task, clips));
         let spec = whole.factory()?.spec().clone();
         let mut meta = PolicyMeta::of(&spec, options.hidden.clone(), Activation::Tanh);
-        (meta.options, meta.clips) = (spec.options.clone(), whole.clips.clone());
+        meta.options = spec.options.clone();
         options.check_memory(teachers.len(), &meta)?;
         let known = options.initialize_from.as_ref().map(|path| policy_file::read(path, None)).transpose()?;
         let about = about(&whole, &teachers, known.as_ref(), options);
 
         let mut classes = Vec::new();
-        for (i, ((path, teacher), clips)) in teachers.into_iter().zip(&lessons_of).enumerate() {
-            let own = clips.as_ref().map_or(Ok(task.clone()), |clips| follow(&task, clips))?;
+        for (i, ((path, teacher), clips)) in teachers.into_iter().zip(lessons_of).enumerate() {
+            let own = clips.map_or(task.clone(), |clips| follow(&task, clips));
             let seed = options.seed.wrapping_add(1_000_003 * (1 + i as u64));
             let make = VecEnvOptions { agents: options.agents, threads: options.threads, seed, ..Default::default() };
             let mut env = own.vec_env(&make)?;
@@ -363,22 +356,35 @@ impl Class {
 }
 
 /// The clips that a teacher follows, if the student's task takes clips.
-fn clips_of(task: &Setting, teacher: &Policy) -> Result<Option<String>, RunError> {
+fn clips_of(task: &Setting, teacher: &Policy) -> Result<Option<Clips>, RunError> {
     if !registry::agent(&task.agent)?.has_option(CLIP) {
         return Ok(None);
     }
     let of_teacher = Setting::of(teacher.meta());
-    if let Some(Value::Text(names)) = of_teacher.factory()?.spec().options.get(CLIP) {
-        return Ok(Some(names.clone()));
+    if let Some(clips) = of_teacher.factory()?.spec().options.get(CLIP).and_then(Clips::read) {
+        return Ok(Some(clips));
     }
     let clips = registry::agent(&of_teacher.agent)?.facts().clips;
-    let names: Vec<&str> = clips.iter().map(|clip| clip.about().name.as_str()).collect();
-    Ok((!names.is_empty()).then(|| names.join(",")))
+    let clips: Clips = clips.iter().map(|clip| NamedClip::shipped(&clip.about().name)).collect();
+    Ok(clips.iter().next().is_some().then_some(clips))
+}
+
+/// The clips of all teachers, each once: a teacher may be listed twice to give it more weight.
+fn together(lessons: &[Option<Clips>]) -> Option<Clips> {
+    let mut all: Vec<&NamedClip> = Vec::new();
+    for clip in lessons.iter().flatten().flat_map(Clips::iter) {
+        if !all.contains(&clip) {
+            all.push(clip);
+        }
+    }
+    (!all.is_empty()).then(|| all.into_iter().cloned().collect())
 }
 
 /// The task with agents that follow these clips.
-fn follow(task: &Setting, clips: &str) -> Result<Setting, RunError> {
-    task.clone().with(&TaskOptions { given: vec![(CLIP.into(), Value::Text(clips.into()))] })
+fn follow(task: &Setting, clips: Clips) -> Setting {
+    let mut task = task.clone();
+    task.options.set(CLIP, clips);
+    task
 }
 
 fn mean(of: impl ExactSizeIterator<Item = f32>) -> f32 {

@@ -1,11 +1,11 @@
 //! The folder of a run: its contents, its lock, and writing files completely or not at all.
 
-use crate::clips::{self, Clips};
+use crate::clips;
 use crate::error::RunError;
 use crate::setting::Setting;
 use crate::text;
 use marathon_config::Loaded;
-use marathon_envs::Options;
+use marathon_envs::{NamedClip, Options};
 use marathon_learn::policy::options;
 use marathon_learn::{Checkpoint, RunConfig, TrainConfig, checksum, read_description, write_atomic, write_description};
 use marathon_physics::budget;
@@ -45,7 +45,7 @@ pub struct RunFile {
     pub version: u32,
     /// Registry name of the agent.
     pub agent: String,
-    /// Options of its task. Empty for a task without options.
+    /// Options of its task. Empty for a task without options. Clips are stored by name.
     #[serde(default, skip_serializing_if = "Options::is_empty", with = "options")]
     pub options: Options,
     /// Clips that the options name and that do not ship with Marathon: files in the run's folder, with their checksums.
@@ -78,7 +78,12 @@ impl RunFile {
             version: VERSION,
             agent: task.agent.clone(),
             options: task.options.clone(),
-            clips: task.clips.iter().map(|(name, text)| (name.clone(), checksum(text.as_bytes()))).collect(),
+            clips: task
+                .options
+                .given_clips()
+                .into_iter()
+                .map(|(name, clip)| (name.into(), checksum(&clip.to_bytes())))
+                .collect(),
             files: Inputs::new(),
             initialize_from: None,
             initialize_from_checksum: None,
@@ -324,14 +329,14 @@ impl RunFolder {
     ///
     /// # Errors
     /// If a file cannot be written.
-    pub fn begin(&self, run: &RunFile, clips: &Clips) -> Result<(), RunError> {
-        for (i, (name, text)) in clips.iter().enumerate() {
+    pub fn begin(&self, run: &RunFile) -> Result<(), RunError> {
+        for (i, (name, clip)) in run.options.given_clips().into_iter().enumerate() {
             // temporary names until `run.json` lists the clips
             let path = self.path.join(format!(".clip-{i}.{}.tmp", std::process::id()));
             let _ = fs::remove_file(&path);
             let write = || {
                 let mut file = File::options().write(true).create_new(true).open(&path)?;
-                file.write_all(text.as_bytes())?;
+                file.write_all(&clip.to_bytes())?;
                 file.sync_all()
             };
             write().map_err(RunError::io(&self.path.join(name), "write"))?;
@@ -369,7 +374,7 @@ impl RunFolder {
     /// # Errors
     /// If a clip is missing, or has changed since the run began.
     pub fn setting(&self, run: &RunFile) -> Result<Setting, RunError> {
-        let mut setting = Setting { agent: run.agent.clone(), options: run.options.clone(), clips: Clips::new() };
+        let mut clips = Vec::new();
         for (name, sum) in &run.clips {
             let path = self.path.join(name);
             let text = budget::read_to_string(&path, &budget::CLIP_FILE).map_err(RunError::io(&path, "read"))?;
@@ -382,9 +387,9 @@ impl RunFolder {
                     format!("{sum}, as in {RUN}; the clip has changed"),
                 ));
             }
-            setting.clips.insert(name.clone(), text);
+            clips.push(NamedClip::parse(name, text.as_bytes())?);
         }
-        Ok(setting)
+        Ok(Setting { agent: run.agent.clone(), options: run.options.clone().bind_clips(&clips) })
     }
 
     /// Removes temporary files of a killed writer. Errors are ignored.

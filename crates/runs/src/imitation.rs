@@ -2,10 +2,10 @@
 
 use crate::error::RunError;
 use crate::play::Play;
-use crate::setting::{CLIP, FIRST, START, Setting, TaskOptions};
-use marathon_envs::agents::marathon::marathon_man::clips::ClipNames;
-use marathon_envs::options::Value;
-use marathon_envs::{Autoreset, VecEnvOptions, registry};
+use crate::setting::{CLIP, FIRST, START, Setting};
+use marathon_envs::agents::marathon::marathon_man::clips;
+use marathon_envs::options::OptionValue;
+use marathon_envs::{Autoreset, Clips, NamedClip, VecEnvOptions, registry};
 use marathon_learn::{EvalOptions, Policy};
 use marathon_motion::{Places, Tracking};
 use marathon_physics::Model;
@@ -56,9 +56,10 @@ pub struct Followed {
 /// If the task cannot be created.
 pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Vec<Imitation>, RunError> {
     let (setting, clips) = clips_of(policy)?;
-    let of_clip = |clip: String| {
-        let first = follow_from(FIRST, &clip, policy, &setting, options)?;
-        let random = follow_from("random", &clip, policy, &setting, options)?;
+    let of_clip = |clip: Option<NamedClip>| {
+        let first = follow_from(FIRST, clip.as_ref(), policy, &setting, options)?;
+        let random = follow_from("random", clip.as_ref(), policy, &setting, options)?;
+        let clip = clip.map_or(String::new(), |clip| clip.name().into());
         Ok(Imitation { clip, episodes: options.episodes as u64, first, random })
     };
     clips.into_iter().map(of_clip).collect()
@@ -70,35 +71,34 @@ pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Vec<Imitation>,
 /// If the task cannot be created.
 pub fn from_beginning(policy: &Policy, options: &EvalOptions) -> Result<Vec<Followed>, RunError> {
     let (setting, clips) = clips_of(policy)?;
-    clips.iter().map(|clip| follow_from(FIRST, clip, policy, &setting, options)).collect()
+    clips.iter().map(|clip| follow_from(FIRST, clip.as_ref(), policy, &setting, options)).collect()
 }
 
-/// A policy's task and the clips that it follows. The name is empty if the task has no choice.
-fn clips_of(policy: &Policy) -> Result<(Setting, Vec<String>), RunError> {
+/// A policy's task and the clips that it follows. `None` if the task has no choice.
+fn clips_of(policy: &Policy) -> Result<(Setting, Vec<Option<NamedClip>>), RunError> {
     let setting = Setting::of(policy.meta());
     let Ok(agent) = registry::agent(&setting.agent) else { return Ok((setting, Vec::new())) };
     if !agent.facts().follows_clips || !agent.has_option(START) {
         return Ok((setting, Vec::new()));
     }
-    let clips = match setting.factory()?.spec().options.get(CLIP) {
-        Some(Value::Text(names)) => ClipNames(names.clone()).names().into_iter().map(String::from).collect(),
-        _ => vec![String::new()],
-    };
+    let clips = setting.factory()?.spec().options.get(CLIP).and_then(Clips::read);
+    let clips = clips.map_or(vec![None], |clips| clips::each(&clips).into_iter().map(Some).collect());
     Ok((setting, clips))
 }
 
 fn follow_from(
     start: &str,
-    clip: &str,
+    clip: Option<&NamedClip>,
     policy: &Policy,
     setting: &Setting,
     options: &EvalOptions,
 ) -> Result<Followed, RunError> {
-    let mut given = vec![(START.to_string(), Value::Text(start.into()))];
-    if !clip.is_empty() {
-        given.push((CLIP.to_string(), Value::Text(clip.into())));
+    let mut setting = setting.clone();
+    setting.options.set(START, start);
+    if let Some(clip) = clip {
+        setting.options.set(CLIP, clip.clone());
     }
-    follow(policy, &setting.clone().with(&TaskOptions { given })?, options)
+    follow(policy, &setting, options)
 }
 
 /// Plays one episode per agent.

@@ -43,7 +43,7 @@ fn load_with(
     let setting = setting(given, agent, options, load)?;
     let factory = setting.factory()?;
     let mut policy = read_with(given, Some(factory.spec()), load)?;
-    policy.set_task(factory.spec().options.clone(), setting.clips);
+    policy.set_options(factory.spec().options.clone());
     Ok((policy, factory))
 }
 
@@ -68,7 +68,7 @@ pub fn load_all(
             return Err(RunError::file(&own, "policy", "no such file", expected));
         }
         let mut policy = read(&own, Some(&spec.of_role(&role)))?;
-        policy.set_task(spec.options.clone(), setting.clips.clone());
+        policy.set_options(spec.options.clone());
         policies.push(policy);
     }
     Ok((policies, factory))

@@ -11,7 +11,7 @@ use crate::policy_file;
 use crate::processes::Processes;
 use crate::report::csv::History;
 use crate::report::summary::{EPISODES, Summary};
-use crate::report::{Reporter, Watch, curve, note_clips, save, save_policies};
+use crate::report::{Reporter, Watch, curve, save, save_policies};
 use crate::setting::{Setting, TaskOptions};
 use crate::task::Task;
 use crate::text::{thousands, whole};
@@ -136,7 +136,7 @@ impl Session {
         let mut folder = None;
         if !dry {
             let made = RunFolder::create(options.out.as_deref(), &agent)?;
-            if let Err(error) = made.begin(&run, &setting.clips) {
+            if let Err(error) = made.begin(&run) {
                 made.discard();
                 return Err(error);
             }
@@ -270,23 +270,20 @@ impl Session {
         show: bool,
         watch: &mut Watch,
     ) -> Result<TrainOutput, RunError> {
-        let Session { run, factory, setting, .. } = self;
+        let Session { run, factory, .. } = self;
         let train = |resume, observer: &mut dyn Observer| {
             train_with(players, &**factory, Isa::best(), &run.config, resume, observer)
         };
         let Some(folder) = &self.folder else {
             let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| watch(stats);
-            let mut output = train(resume, &mut observer)?;
-            note_clips(&mut output, &setting.clips);
-            return Ok(output);
+            return Ok(train(resume, &mut observer)?);
         };
         let terms = &factory.spec().reward_terms;
-        let mut reporter = Reporter::new(folder, run, (terms, &setting.clips), resume.as_ref(), (show, watch))?;
+        let mut reporter = Reporter::new(folder, run, terms, resume.as_ref(), (show, watch))?;
         let result = train(resume, &mut reporter);
         reporter.finish();
         let (error, told) = (reporter.error.take(), reporter.told);
-        let mut output = result?;
-        note_clips(&mut output, &setting.clips);
+        let output = result?;
         let steps = output.checkpoint.steps();
         // save the results first; an iteration that was not reported is repeated on resume
         let saved = if told { save(folder, &output).map(|()| true) } else { Ok(false) };

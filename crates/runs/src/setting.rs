@@ -1,6 +1,6 @@
 //! A task of the registry with its arguments: what a run, a policy and a process need to make the same environments.
 
-use crate::clips::{self, Clips};
+use crate::clips;
 use crate::error::RunError;
 use crate::text::whole;
 use marathon_envs::options::{OF_LEARNING, Value};
@@ -8,10 +8,9 @@ use marathon_envs::shard::task_of_role;
 use marathon_envs::{ModelSource, Options, ShardFactory, VecEnv, VecEnvOptions, registry};
 use marathon_learn::PolicyMeta;
 use marathon_learn::policy::options;
-use marathon_physics::budget;
 use marathon_physics::lanes::Isa;
 use serde::{Deserialize, Serialize};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 /// The argument that names motion clips.
 pub(crate) const CLIP: &str = "clip";
@@ -22,9 +21,6 @@ pub(crate) const FIRST: &str = "first";
 
 /// The argument that names a model file, which replaces the one that comes with Marathon.
 const XML: &str = "xml_file";
-
-/// Held while clips have their names and environments are made with them: another policy's clips may have the same names.
-static NAMING: Mutex<()> = Mutex::new(());
 
 /// Arguments of a task.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -47,12 +43,9 @@ impl From<Options> for TaskOptions {
 pub struct Setting {
     /// Registry name of the agent.
     pub agent: String,
-    /// Its arguments; those that are not here have their defaults.
-    #[serde(default, with = "options")]
+    /// Its arguments; those that are not here have their defaults. Files have motion clips in a second entry, `clips`.
+    #[serde(flatten, with = "options::beside")]
     pub options: Options,
-    /// Clips that the arguments name and that do not come with Marathon.
-    #[serde(default)]
-    pub clips: Clips,
 }
 
 impl Setting {
@@ -73,11 +66,7 @@ impl Setting {
     /// The same with all arguments of a policy that has been [loaded](crate::policy_file::load_all): those that only help to learn are
     /// among them if the caller has asked for them.
     pub fn asked(policy: &PolicyMeta) -> Self {
-        Setting {
-            agent: task_of_role(&policy.agent).into(),
-            options: policy.options.clone(),
-            clips: policy.clips.clone(),
-        }
+        Setting { agent: task_of_role(&policy.agent).into(), options: policy.options.clone() }
     }
 
     /// The same with episodes that start as they do for whoever plays, if the agent can start elsewhere.
@@ -91,22 +80,19 @@ impl Setting {
         self.with(&TaskOptions { given: vec![(START.into(), Value::Text(FIRST.into()))] })
     }
 
-    /// The same with more arguments, or other values of some. Clips in files are read; the argument then holds their names.
+    /// The same with more arguments, or other values of some. Clips in files are read; the argument then holds them.
     ///
     /// # Errors
     /// If the agent does not take an argument, or a file cannot be read or is no clip for the agent.
     pub fn with(mut self, options: &TaskOptions) -> Result<Self, RunError> {
         let agent = registry::agent(&self.agent)?;
         for (name, value) in &options.given {
-            let value = match value {
-                Value::Text(text) if name == CLIP && agent.has_option(CLIP) => {
-                    Value::Text(clips::read_all(text, &self.agent, &agent.model()?, &mut self.clips)?)
-                }
-                other => other.clone(),
+            let value = match name == CLIP && agent.has_option(CLIP) {
+                true => clips::read_all(value, self.options.get(CLIP), &self.agent, &agent.model()?)?,
+                false => value.clone(),
             };
             self.options.set(name, value);
         }
-        self.forget_unused_clips();
         // a policy or run may be used from another folder
         if let Some(ModelSource::File(path)) = self.model()
             && self.options.get(XML) == Some(&Value::Text(path.to_string_lossy().into_owned()))
@@ -122,26 +108,18 @@ impl Setting {
         Some(registry::global().agent_with(&self.agent, &self.options).ok()?.facts().model)
     }
 
-    fn forget_unused_clips(&mut self) {
-        if let Some(Value::Text(names)) = self.options.get(CLIP) {
-            self.clips.retain(|clip, _| names.split(',').any(|name| name.trim() == clip));
-        }
-    }
-
-    /// The same with all arguments that another setting of the agent has, and its clips.
+    /// The same with all arguments that another setting of the agent has.
     pub fn overlaid(mut self, other: &Setting) -> Self {
         for (name, value) in other.options.iter() {
             self.options.set(name, value.clone());
         }
-        self.clips.extend(other.clips.clone());
-        self.forget_unused_clips();
         self
     }
 
     /// Its environments.
     ///
     /// # Errors
-    /// If there is no such agent, it does not take the arguments, or a clip is damaged.
+    /// If there is no such agent, or it does not take the arguments.
     pub fn factory(&self) -> Result<Arc<dyn ShardFactory>, RunError> {
         self.factory_on(Isa::best())
     }
@@ -151,7 +129,7 @@ impl Setting {
     /// # Errors
     /// The same.
     pub fn factory_on(&self, isa: Isa) -> Result<Arc<dyn ShardFactory>, RunError> {
-        self.with_clips(|| Ok(registry::factory_with(&self.agent, &self.options, isa)?))
+        Ok(registry::factory_with(&self.agent, &self.options, isa)?)
     }
 
     /// Agents of it, by the other options.
@@ -160,32 +138,7 @@ impl Setting {
     /// The same, or if the options make no sense.
     pub fn vec_env(&self, options: &VecEnvOptions) -> Result<VecEnv, RunError> {
         let options = VecEnvOptions { options: self.options.clone(), ..options.clone() };
-        self.with_clips(|| Ok(VecEnv::new(&self.agent, &options)?))
-    }
-
-    /// Makes something while the setting's clips have their names: environments look them up when they are made, and another
-    /// setting's clips may have the same names.
-    ///
-    /// # Errors
-    /// If a clip is damaged, or those of `make`.
-    pub fn with_clips<T, E: From<RunError>>(&self, make: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
-        if self.clips.len() > marathon_envs::agents::marathon::marathon_man::clips::MOST {
-            let problem = format!(
-                "has {} clips, expected at most {}",
-                self.clips.len(),
-                marathon_envs::agents::marathon::marathon_man::clips::MOST
-            );
-            return Err(RunError::option("option", problem).into());
-        }
-        // an untrusted policy may name a device or a pipe, which never end
-        if let Some(ModelSource::File(path)) = self.model()
-            && std::fs::metadata(&path).is_ok_and(|facts| !facts.is_file())
-        {
-            budget::read(&path, &budget::MODEL_FILE).map_err(RunError::io(&path, "read"))?;
-        }
-        let _naming = NAMING.lock().unwrap_or_else(PoisonError::into_inner);
-        clips::name(&self.clips)?;
-        make()
+        Ok(VecEnv::new(&self.agent, &options)?)
     }
 }
 

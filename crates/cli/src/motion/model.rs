@@ -57,12 +57,11 @@ pub fn clip(path: &Path) -> Result<Clip, CliError> {
     }
     if !path.exists() {
         let name = path.to_str().unwrap_or_default();
-        if let Some(clip) = known::find(name) {
+        if let Some(clip) = known::shipped(name) {
             return Ok((*clip).clone());
         }
         let file = nearest_path(path, &[], |file| file.extension().is_some_and(|ending| ending == "motion"));
-        let names = known::all_names();
-        let near = file.or_else(|| nearest(name, names.iter().map(String::as_str)).map(Into::into));
+        let near = file.or_else(|| nearest(name, known::names()).map(Into::into));
         return Err(missing(path, "a clip (.motion)", near).into());
     }
     let bytes = budget::read(path, &CLIP_FILE).map_err(CliError::io(path, "read"))?;

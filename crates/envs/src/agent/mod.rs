@@ -8,6 +8,7 @@
 //! are independent: there is no way to read another lane.
 
 pub(crate) mod bindings;
+mod clips;
 mod command;
 mod ctrl;
 mod facts;
@@ -20,17 +21,19 @@ pub mod senses;
 mod site;
 mod start;
 pub mod tolerance;
+mod value;
 
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
 use crate::episode_rng::EpisodeRng;
 
+pub use clips::{Clips, NamedClip};
 pub use command::CommandRange;
 pub use ctrl::Ctrl;
 pub(crate) use facts::FORWARD;
 pub use facts::{Body, Controls, Facts, ModelSource, Motors, Part, ResetNoise, View, names};
-pub use options::{OptionInfo, OptionSet, OptionValue, Options, Scale, Seconds, Share, Value};
+pub use options::{OptionInfo, OptionSet, OptionValue, Options, Scale, Seconds, Share};
 pub use outputs::{Obs, Terms};
 pub use reference::{Following, Frame};
 pub use role::RoleFacts;
@@ -38,6 +41,7 @@ pub use senses::Senses;
 pub use site::Site;
 pub use start::Start;
 pub use tolerance::{Sigmoid, Tolerance};
+pub use value::Value;
 
 /// A creature with a task.
 pub trait Agent: Send + Sync + 'static {

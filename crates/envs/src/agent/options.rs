@@ -4,73 +4,14 @@
 //! defaults and what they mean, and [`Agent::options`](crate::Agent::options) shows it to everybody who makes
 //! environments by name. Who gives a name that is not in the list is told the nearest one that is.
 
-use std::fmt;
-use std::str::FromStr;
+use std::collections::BTreeMap;
+use std::sync::Arc;
 
+use marathon_motion::Clip;
 use marathon_physics::budget::FILM_SECONDS;
 
-/// Value of an argument.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Value {
-    /// Yes or no.
-    Bool(bool),
-    /// A number, which may be infinite but is never NaN.
-    Number(f64),
-    /// The ends of a range.
-    Pair([f64; 2]),
-    /// A name or a path.
-    Text(String),
-}
-
-impl fmt::Display for Value {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self {
-            Value::Bool(x) => write!(f, "{x}"),
-            Value::Number(x) => write!(f, "{x}"),
-            Value::Pair([a, b]) => write!(f, "({a}, {b})"),
-            Value::Text(x) => write!(f, "'{x}'"),
-        }
-    }
-}
-
-/// As on a command line: `true`, `-0.5`, `inf`, `0.7,2` or `(0.7, inf)`; whatever else is a text.
-impl FromStr for Value {
-    type Err = std::convert::Infallible;
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let text = text.trim();
-        let number = |s: &str| s.trim().parse::<f64>().ok().filter(|x| !x.is_nan());
-        let bare = text.trim_start_matches(['(', '[']).trim_end_matches([')', ']']);
-        let pair = bare.split_once(',').and_then(|(a, b)| Some([number(a)?, number(b)?]));
-        Ok(match (text.to_lowercase().as_str(), number(text), pair) {
-            ("true", ..) => Value::Bool(true),
-            ("false", ..) => Value::Bool(false),
-            (_, Some(x), _) => Value::Number(x),
-            (_, _, Some(x)) => Value::Pair(x),
-            _ => Value::Text(text.into()),
-        })
-    }
-}
-
-impl From<bool> for Value {
-    fn from(x: bool) -> Self {
-        Value::Bool(x)
-    }
-}
-impl From<f64> for Value {
-    fn from(x: f64) -> Self {
-        Value::Number(x)
-    }
-}
-impl From<[f64; 2]> for Value {
-    fn from(x: [f64; 2]) -> Self {
-        Value::Pair(x)
-    }
-}
-impl From<&str> for Value {
-    fn from(x: &str) -> Self {
-        Value::Text(x.into())
-    }
-}
+pub use super::clips::{Clips, NamedClip};
+pub use super::value::Value;
 
 /// Arguments that help to learn: whoever plays a policy has their defaults, whatever it learned with.
 pub const OF_LEARNING: [&str; 3] = ["mortal", "knocked", "relive"];
@@ -97,9 +38,14 @@ impl Options {
         self
     }
 
-    /// Adds an argument, or replaces its value.
+    /// Adds an argument, or replaces its value. Clips whose names other arguments' clips have get other names.
     pub fn set(&mut self, name: &str, value: impl Into<Value>) {
-        let value = value.into();
+        let mut value = value.into();
+        if let Value::Clips(clips) = value {
+            let others = self.iter().filter(|(known, _)| *known != name);
+            let others: Vec<NamedClip> = others.filter_map(|(_, value)| Clips::read(value)).flatten().collect();
+            value = clips.beside(&others).into();
+        }
         match self.0.iter_mut().find(|(known, _)| known == name) {
             Some((_, old)) => *old = value,
             None => self.0.push((name.into(), value)),
@@ -114,6 +60,27 @@ impl Options {
     /// All names and values.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &Value)> {
         self.0.iter().map(|(name, value)| (name.as_str(), value))
+    }
+
+    /// Clips that the arguments hold, with their names, each once. Those that come with Marathon are not among them.
+    pub fn given_clips(&self) -> BTreeMap<&str, &Arc<Clip>> {
+        let clips = self.0.iter().filter_map(|(_, value)| match value {
+            Value::Clips(clips) => Some(clips.given()),
+            _ => None,
+        });
+        clips.flatten().collect()
+    }
+
+    /// The same with clips in place of their names, as they were before they were stored.
+    pub fn bind_clips(mut self, given: &[NamedClip]) -> Self {
+        for (_, value) in &mut self.0 {
+            if let Value::Text(names) = value
+                && names.split(',').any(|name| given.iter().any(|clip| clip.name() == name.trim()))
+            {
+                *value = Clips::named(names).bound(given).into();
+            }
+        }
+        self
     }
 
     /// These without some.
@@ -304,6 +271,20 @@ impl OptionValue for String {
     fn read(value: &Value) -> Option<Self> {
         match value {
             Value::Text(x) => Some(x.clone()),
+            _ => None,
+        }
+    }
+}
+
+impl OptionValue for Clips {
+    const EXPECTED: &'static str = "the name of a clip, several with commas between them, or all";
+    fn value(&self) -> Value {
+        self.clone().into()
+    }
+    fn read(value: &Value) -> Option<Self> {
+        match value {
+            Value::Text(names) => Some(Clips::named(names)),
+            Value::Clips(clips) => Some(clips.clone()),
             _ => None,
         }
     }

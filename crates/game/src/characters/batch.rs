@@ -46,11 +46,9 @@ impl CharacterBatch {
         let (engine, n_obs, out) = match &kind.character {
             Character::Agent(name) => {
                 let (setting, id) = (&kind.setting, kind.spec.as_ref().map_or(name, |spec| &spec.id));
-                let mut env = setting.with_clips(|| -> Result<VecEnv, CharacterError> {
-                    let (registry, options) = kind.ground.registry(id, &setting.options)?;
-                    let options = VecEnvOptions { agents: BLOCK, autoreset: Autoreset::Disabled, options, ..default() };
-                    Ok(VecEnv::from_registry(&registry, id, &options)?)
-                })?;
+                let (registry, options) = kind.ground.registry(id, &setting.options)?;
+                let options = VecEnvOptions { agents: BLOCK, autoreset: Autoreset::Disabled, options, ..default() };
+                let mut env = VecEnv::from_registry(&registry, id, &options)?;
                 let (n_obs, out) = (env.spec().obs, env.buffers());
                 env.reset(None, &mut vec![0.0; n_obs * BLOCK])?;
                 (Engine::Env(Box::new(env)), n_obs, out)

@@ -67,22 +67,20 @@ pub(crate) struct CharacterKind {
 impl CharacterKind {
     /// The kind of an agent of the registry in a task and on a ground, without ragdolls yet.
     pub fn of_agent(name: &str, setting: &Setting, ground: Ground, time: Duration) -> Result<Self, CharacterError> {
-        setting.with_clips(|| {
-            let agent = ground.agent_with(&setting.agent, &setting.options)?;
-            let spec = agent.clone().shards(Isa::best())?.spec().clone();
-            Ok(CharacterKind {
-                character: Character::Agent(name.into()),
-                setting: setting.clone(),
-                ground,
-                model: Arc::new(agent.model()?),
-                feet: agent.facts().feet.iter().map(|n| Arc::from(n.as_str())).collect(),
-                substeps: spec.frame_skip,
-                dt: spec.dt,
-                period: Duration::from_secs_f64(spec.dt),
-                spec: Some(Arc::new(spec)),
-                time,
-                batches: Vec::new(),
-            })
+        let agent = ground.agent_with(&setting.agent, &setting.options)?;
+        let spec = agent.clone().shards(Isa::best())?.spec().clone();
+        Ok(CharacterKind {
+            character: Character::Agent(name.into()),
+            setting: setting.clone(),
+            ground,
+            model: Arc::new(agent.model()?),
+            feet: agent.facts().feet.iter().map(|n| Arc::from(n.as_str())).collect(),
+            substeps: spec.frame_skip,
+            dt: spec.dt,
+            period: Duration::from_secs_f64(spec.dt),
+            spec: Some(Arc::new(spec)),
+            time,
+            batches: Vec::new(),
         })
     }
 

@@ -37,7 +37,6 @@ use marathon_envs::{Options, Spec};
 use marathon_physics::lanes::Real;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::collections::BTreeMap;
 
 const FORMAT: &str = "marathon-policy";
 const VERSION: u32 = 1;
@@ -56,12 +55,10 @@ pub struct PolicyMeta {
     pub version: u32,
     /// Name of the agent with its task, such as `Hopper-v0`.
     pub agent: String,
-    /// Options of the task, with the values that the policy was trained for. Empty for a task without options.
-    #[serde(default, skip_serializing_if = "Options::is_empty", with = "options")]
+    /// Options of the task, with the values that the policy was trained for. Empty for a task without options. The file stores
+    /// motion clips in a second entry, `clips`: names, and texts of `.motion` files.
+    #[serde(flatten, with = "options::beside")]
     pub options: Options,
-    /// Motion clips that the options name and that do not ship with Marathon: names, and texts of `.motion` files.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub clips: BTreeMap<String, String>,
     /// Observation length.
     pub obs: usize,
     /// Action length.
@@ -100,7 +97,6 @@ impl PolicyMeta {
             version: VERSION,
             agent: spec.id.clone(),
             options: spec.options.clone(),
-            clips: BTreeMap::new(),
             obs: spec.obs,
             act: spec.act,
             control_dt: spec.dt,
@@ -189,9 +185,9 @@ impl Policy {
     pub fn set_evaluation(&mut self, evaluation: Evaluation) {
         self.meta.evaluation = Some(evaluation);
     }
-    /// Stores the options of the policy's task, and the clips that they name.
-    pub fn set_task(&mut self, options: Options, clips: BTreeMap<String, String>) {
-        (self.meta.options, self.meta.clips) = (options, clips);
+    /// Stores the options of the policy's task.
+    pub fn set_options(&mut self, options: Options) {
+        self.meta.options = options;
     }
     /// The network.
     pub fn net(&self) -> &Mlp {

@@ -1,7 +1,7 @@
 //! Options of a task as JSON: an object of booleans, numbers, pairs of numbers or texts. Infinite numbers, which JSON
 //! lacks, become the texts `inf` and `-inf`.
 //!
-//! For serde's `with` attribute.
+//! For serde's `with` attribute. A motion clip becomes its name; [`beside`] stores the clips themselves, too.
 
 use marathon_envs::Options;
 use marathon_envs::options::Value;
@@ -10,6 +10,8 @@ use serde::ser::SerializeMap;
 use serde::{Deserializer, Serializer};
 use serde_json::{Value as Json, json};
 use std::fmt;
+
+pub mod beside;
 
 /// Writes options.
 ///
@@ -56,6 +58,7 @@ fn document(value: &Value) -> Json {
         Value::Number(x) => number(*x),
         Value::Pair([a, b]) => json!([number(*a), number(*b)]),
         Value::Text(x) => json!(x),
+        Value::Clips(x) => json!(x.to_string()),
     }
 }
 

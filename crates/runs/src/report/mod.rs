@@ -8,7 +8,6 @@ pub mod progress;
 pub mod summary;
 pub mod tensorboard;
 
-use crate::clips::Clips;
 use crate::error::RunError;
 use crate::folder::{POLICIES, RunFile, RunFolder};
 use csv::CsvLog;
@@ -26,7 +25,6 @@ pub struct Reporter<'a> {
     folder: &'a RunFolder,
     run: &'a RunFile,
     terms: Vec<String>,
-    clips: Clips,
     progress: Option<Progress>,
     watch: &'a mut Watch<'a>,
     csv: CsvLog,
@@ -42,15 +40,15 @@ pub struct Reporter<'a> {
 }
 
 impl<'a> Reporter<'a> {
-    /// Prepares a new or resumed run, with the names of its reward terms and its own clips. Rows and events of later
-    /// iterations are removed. `show`: show progress on stderr. `watch` may end the run.
+    /// Prepares a new or resumed run. `terms`: names of its reward terms. Rows and events of later iterations are removed.
+    /// `show`: show progress on stderr. `watch` may end the run.
     ///
     /// # Errors
     /// If a file cannot be read or written.
     pub fn new(
         folder: &'a RunFolder,
         run: &'a RunFile,
-        (terms, clips): (&[String], &Clips),
+        terms: &[String],
         resume: Option<&Checkpoint>,
         (show, watch): (bool, &'a mut Watch<'a>),
     ) -> Result<Self, RunError> {
@@ -62,7 +60,6 @@ impl<'a> Reporter<'a> {
             folder,
             run,
             terms: terms.to_vec(),
-            clips: clips.clone(),
             progress: show.then(|| Progress::new(run.config.run.total_steps, steps, run.summary_freq)),
             watch,
             csv,
@@ -98,8 +95,7 @@ impl<'a> Reporter<'a> {
         if stats.steps < self.due {
             self.told = true;
         } else {
-            let mut output = snapshot.output();
-            note_clips(&mut output, &self.clips);
+            let output = snapshot.output();
             // if the run is interrupted before this completes, the resumed run repeats it
             self.keep(&output.policy)?;
             self.told = true;
@@ -157,13 +153,6 @@ pub fn kept_policies(run: &Path) -> Vec<(u64, PathBuf)> {
     let mut kept: Vec<_> = entries.filter_map(|entry| of(entry.path())).collect();
     kept.sort();
     kept
-}
-
-/// Adds the clips that a policy's task needs to policies.
-pub fn note_clips(output: &mut TrainOutput, clips: &Clips) {
-    for policy in [&mut output.policy].into_iter().chain(output.others.iter_mut().map(|(_, policy)| policy)) {
-        policy.set_task(policy.meta().options.clone(), clips.clone());
-    }
 }
 
 /// Writes the checkpoint, then the policies.

@@ -3,8 +3,9 @@
 use crate::app::notifications::Notifications;
 use crate::app::stage::policies::ShippedPolicies;
 use crate::app::stage::scenario::{PolicySource, Scenario};
+use marathon_envs::Clips;
 use marathon_envs::agents::marathon::marathon_man::clips;
-use marathon_envs::options::Value;
+use marathon_envs::options::OptionValue;
 use marathon_envs::registry;
 use marathon_runs::Setting;
 
@@ -23,10 +24,7 @@ pub fn clip_of(scenario: &Scenario, shipped: &ShippedPolicies) -> Option<String>
     let setting = scenario.setting(shipped).ok()?;
     let infos = registry::agent(&setting.agent).ok()?.options();
     let default = infos.into_iter().find(|info| info.name == CLIP)?.value;
-    match setting.options.get(CLIP).cloned().unwrap_or(default) {
-        Value::Text(name) => Some(name),
-        _ => None,
-    }
+    Clips::read(setting.options.get(CLIP).unwrap_or(&default)).map(|clips| clips.to_string())
 }
 
 /// Sets the clip that the agent of a scenario follows.
@@ -49,7 +47,7 @@ pub fn next_clip(scenario: &mut Scenario, shipped: &ShippedPolicies, notes: &mut
         scenario.play(PolicySource::Shipped, shipped);
         return true;
     };
-    let all: Vec<String> = clips::all_names().into_iter().filter(|name| !name.ends_with(".motion")).collect();
+    let all = clips::names();
     let next = all.iter().position(|name| *name == clip).map_or(0, |i| (i + 1) % all.len().max(1));
     let Some(name) = all.get(next) else { return false };
     choose_clip(scenario, name);

@@ -183,5 +183,5 @@ fn task_model(scenario: &Scenario, shipped: &ShippedPolicies, setting: &mut Sett
         course::check(&scenario.course, &task)?;
     }
     *setting = task;
-    setting.with_clips(|| Ok(registry::agent(&setting.agent)?.with_options(&setting.options)?.model()?))
+    Ok(registry::agent(&setting.agent)?.with_options(&setting.options)?.model()?)
 }

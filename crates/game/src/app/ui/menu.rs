@@ -241,10 +241,9 @@ fn choose(ui: &mut Ui, draft: &mut Draft, shipped: &ShippedPolicies) {
             ui.label("Clip");
             let mut wanted = clip.clone();
             ComboBox::from_id_salt("clip").selected_text(clip.as_str()).width(230.0).show_ui(ui, |ui| {
-                let known = clips::all_names();
-                // a clip of a file is listed only if the user has chosen it
-                for name in known.into_iter().filter(|name| !name.ends_with(".motion") || *name == clip) {
-                    ui.selectable_value(&mut wanted, name.clone(), name);
+                let chosen = Some(clip.as_str()).filter(|name| name.ends_with(".motion"));
+                for name in clips::names().into_iter().chain(chosen) {
+                    ui.selectable_value(&mut wanted, name.into(), name);
                 }
             });
             if wanted != clip {

@@ -11,8 +11,8 @@ use crate::simulate::Marathon;
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, Area, Color32, Id, Sense, Ui};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
-use marathon_envs::options::Value;
-use marathon_envs::{CommandRange, Spec};
+use marathon_envs::options::OptionValue;
+use marathon_envs::{Clips, CommandRange, Spec};
 
 /// Relative error of the measured time factor above which the screen shows it.
 const OFF_PACE: f32 = 0.1;
@@ -208,8 +208,8 @@ fn clip(ui: &mut Ui, anatomy: &Anatomy, episode: &Episode) {
         painter.rect_filled(bar, 3.0, Color32::from_white_alpha(18));
         let over = bar.with_max_x(bar.left() + bar.width() * phase.clamp(0.0, 1.0));
         painter.rect_filled(over, 3.0, ACCENT);
-        if let Some(Value::Text(clip)) = spec.options.get("clip") {
-            line(ui, text(13.0, TEXT, clip.as_str()));
+        if let Some(clips) = spec.options.get("clip").and_then(Clips::read) {
+            line(ui, text(13.0, TEXT, clips.to_string()));
         }
     });
     let errors = [("joint_error", "joints", "rad"), ("position_error", "parts", "m")];

@@ -149,7 +149,6 @@ pub fn decode(path: &Path, bytes: &[u8], spec: Option<&Spec>) -> Result<Policy, 
     }
     if let Some(noted) = noted.filter(|noted| noted.agent == spec.id) {
         (meta.training, meta.evaluation) = (noted.training, noted.evaluation);
-        meta.clips = noted.clips;
     }
     let mut log_std = log_std(&values, spec.act);
     for (log_std, scale) in log_std.iter_mut().zip(&parts.spread) {

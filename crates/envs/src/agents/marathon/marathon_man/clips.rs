@@ -1,13 +1,12 @@
-//! Clips by name: those that come with the crate, and those of a caller.
+//! Clips that come with the crate, and options that take clips.
 
 use std::path::Path;
-use std::sync::{Arc, LazyLock, PoisonError, RwLock};
+use std::sync::{Arc, LazyLock};
 
 use marathon_motion::Clip;
 use marathon_physics::hint::among;
 
-use crate::agent::Value;
-use crate::agent::options::OptionValue;
+use crate::agent::{Clips, NamedClip};
 
 /// A clip that comes with the crate.
 struct Shipped {
@@ -48,113 +47,57 @@ static SHIPPED: [Shipped; 17] = shipped![
     "stand",
 ];
 
-/// Limit on the numbers in all clips that callers register, 256 MB. Beyond it, older clips are dropped.
-const MOST_NUMBERS: usize = 32_000_000;
-
-/// Clips registered by callers, the latest last.
-static ADDED: RwLock<Vec<(String, Arc<Clip>)>> = RwLock::new(Vec::new());
-
-/// Registers a clip under a name and replaces an earlier clip of that name. Environments made with the earlier clip
-/// keep it. If all registered clips exceed 256 MB, the oldest ones are dropped.
-pub fn add(name: &str, clip: Clip) {
-    let mut added = ADDED.write().unwrap_or_else(PoisonError::into_inner);
-    added.retain(|(known, _)| known != name);
-    added.push((name.into(), Arc::new(clip)));
-    forget(&mut added, MOST_NUMBERS);
-}
-
-/// Drops the oldest clips until the rest fit the limit. The latest one stays.
-fn forget(clips: &mut Vec<(String, Arc<Clip>)>, most: usize) {
-    let numbers = |clip: &Clip| clip.frames() * (clip.layout().nq() + clip.layout().nv());
-    let mut sum = 0;
-    let kept = clips.iter().rev().take_while(|(_, clip)| {
-        sum += numbers(clip);
-        sum <= most
-    });
-    let kept = kept.count().max(1).min(clips.len());
-    clips.drain(..clips.len() - kept);
-}
-
-/// The clip of a name.
-pub fn find(name: &str) -> Option<Arc<Clip>> {
-    let added = ADDED.read().unwrap_or_else(PoisonError::into_inner);
-    let of_callers = added.iter().find(|(known, _)| known == name).map(|(_, clip)| clip.clone());
-    of_callers.or_else(|| shipped(name))
-}
-
-/// The clip of a name that comes with the crate, whatever callers have added.
-pub(super) fn shipped(name: &str) -> Option<Arc<Clip>> {
+/// The clip of a name that comes with the crate.
+pub fn shipped(name: &str) -> Option<Arc<Clip>> {
     SHIPPED.iter().find(|shipped| shipped.name == name).map(|shipped| (*shipped.clip).clone())
 }
 
-/// Names of all clips that are known, those that come with the crate first.
-pub fn all_names() -> Vec<String> {
-    let added = ADDED.read().unwrap_or_else(PoisonError::into_inner);
-    let of_callers = added.iter().map(|(name, _)| name.clone());
-    SHIPPED.iter().map(|shipped| shipped.name.to_string()).chain(of_callers).collect()
+/// Names of all clips that come with the crate.
+pub fn names() -> Vec<&'static str> {
+    SHIPPED.iter().map(|shipped| shipped.name).collect()
 }
-
-/// Clips as an argument: their names with commas between them, or [`ALL`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct ClipNames(pub String);
 
 /// What stands for all clips that come with the crate, but for the one that does not move.
 pub const ALL: &str = "all";
 
-/// Most clips of a task. A clip may be named several times.
-pub const MOST: usize = 1000;
-
 /// The clip that does not move.
 pub const STAND: &str = "stand";
 
-impl OptionValue for ClipNames {
-    const EXPECTED: &'static str = "the name of a clip, several with commas between them, or all";
-    fn value(&self) -> Value {
-        Value::Text(self.0.clone())
-    }
-    fn read(value: &Value) -> Option<Self> {
-        match value {
-            Value::Text(name) => Some(ClipNames(name.clone())),
-            _ => None,
-        }
+/// Whether an option has [`ALL`] clips.
+pub fn is_all(option: &Clips) -> bool {
+    option.to_string() == ALL
+}
+
+/// The clips of an option, one by one.
+pub fn each(option: &Clips) -> Clips {
+    match is_all(option) {
+        true => names().into_iter().filter(|name| *name != STAND).map(NamedClip::shipped).collect(),
+        false => option.clone(),
     }
 }
 
-impl ClipNames {
-    /// Each name.
-    pub fn names(&self) -> Vec<&str> {
-        match self.0.as_str() {
-            ALL => SHIPPED.iter().map(|shipped| shipped.name).filter(|name| *name != STAND).collect(),
-            names => names.split(',').map(str::trim).collect(),
+/// The clips of an option, as far as there are any of these names.
+pub fn find(option: &Clips) -> Vec<Arc<Clip>> {
+    let find = |clip: NamedClip| clip.clip().cloned().or_else(|| shipped(clip.name()));
+    each(option).into_iter().filter_map(find).collect()
+}
+
+/// Whether an option has clips of these names, and no others but given ones, where they are allowed.
+///
+/// # Errors
+/// If one is missing; the text names the nearest.
+pub fn check(option: &Clips, known: &[&str], allow_given: bool) -> Result<(), String> {
+    let count = option.iter().count();
+    if count > Clips::MOST {
+        return Err(format!("option clip has {count} clips, expected at most {}", Clips::MOST));
+    }
+    let is_known = |clip: &&NamedClip| known.contains(&clip.name()) || (allow_given && clip.clip().is_some());
+    match option.iter().find(|clip| !is_known(clip)) {
+        Some(missing) if !is_all(option) => {
+            let (name, hint) = (missing.name(), among(missing.name(), known));
+            Err(format!("option clip is '{name}', expected a clip that is known{hint}"))
         }
-    }
-
-    /// The clips, as far as they are known.
-    pub fn find(&self) -> Vec<Arc<Clip>> {
-        self.names().into_iter().filter_map(find).collect()
-    }
-
-    /// Whether there are such clips.
-    ///
-    /// # Errors
-    /// If one is missing; the text names the nearest.
-    pub fn check(&self) -> Result<(), String> {
-        self.check_among(&all_names())
-    }
-
-    /// Whether they are `all`, or among some.
-    ///
-    /// # Errors
-    /// If one is not; the text names the nearest.
-    pub fn check_among<S: AsRef<str>>(&self, known: &[S]) -> Result<(), String> {
-        let count = self.names().len();
-        if count > MOST {
-            return Err(format!("option clip has {count} clips, expected at most {MOST}"));
-        }
-        let known: Vec<&str> = known.iter().map(AsRef::as_ref).collect();
-        let missing = self.names().into_iter().find(|name| self.0 != ALL && !known.contains(name));
-        let Some(missing) = missing else { return Ok(()) };
-        Err(format!("option clip is '{missing}', expected a clip that is known{}", among(missing, &known)))
+        _ => Ok(()),
     }
 }
 
@@ -164,22 +107,8 @@ mod tests {
 
     #[test]
     fn a_task_has_a_bounded_number_of_clips() {
-        let named = |count: usize| ClipNames(vec!["walk"; count].join(",")).check();
-        assert_eq!(named(MOST), Ok(()));
-        assert_eq!(named(MOST + 1), Err("option clip has 1001 clips, expected at most 1000".into()));
-    }
-
-    #[test]
-    fn the_oldest_clips_are_forgotten() {
-        let clip = shipped("stand").unwrap();
-        let one = clip.frames() * (clip.layout().nq() + clip.layout().nv());
-        let mut clips: Vec<_> = ["a", "b", "c"].into_iter().map(|name| (name.to_string(), clip.clone())).collect();
-        let names = |clips: &[(String, Arc<Clip>)]| clips.iter().map(|(name, _)| name.clone()).collect::<String>();
-        forget(&mut clips, 3 * one);
-        assert_eq!(names(&clips), "abc");
-        forget(&mut clips, 2 * one);
-        assert_eq!(names(&clips), "bc");
-        forget(&mut clips, 0);
-        assert_eq!(names(&clips), "c");
+        let named = |count: usize| check(&Clips::named(&vec!["walk"; count].join(",")), &names(), true);
+        assert_eq!(named(Clips::MOST), Ok(()));
+        assert_eq!(named(Clips::MOST + 1), Err("option clip has 1001 clips, expected at most 1000".into()));
     }
 }

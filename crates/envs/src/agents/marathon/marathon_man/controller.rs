@@ -27,7 +27,7 @@ use super::super::imitation::{self, StartAt, sub, turned_to};
 use super::body::{
     ACTIONS, ANATOMY, BUTT, Control, DAMPING_TIME, FEET, FIRST_QPOS, FIRST_QVEL, JOINTS, PARTS, TOUCH, model,
 };
-use super::clips::{self, ALL, ClipNames};
+use super::clips::{self, ALL};
 use super::skills::{BACKFLIP, FROM_A_STAND, JUMP, RISEN, SKILLS, SLOTS, Skills, carriage};
 use super::steer::{
     BEGUN, CLIPS, Commands, DIRECTION, FASTEST, Haste, OBSERVATION, PACE, SHARPEST, Steer, SteerArguments, TARGET,
@@ -36,8 +36,8 @@ use super::steer::{
 use super::{FRAME_SKIP, SECONDS, decisions};
 use crate::agent::senses::{clamp, hypot};
 use crate::agent::{
-    Agent, CommandRange, Ctrl, Facts, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Seconds, Senses, Share,
-    Start, Terms, names,
+    Agent, Clips, CommandRange, Ctrl, Facts, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Seconds, Senses,
+    Share, Start, Terms, names,
 };
 use crate::episode_rng::EpisodeRng;
 
@@ -86,7 +86,7 @@ crate::options! {
         commands: Commands = Commands::Even,
         /// Clips to use, `all` or some of them. They set where episodes start and which commands are drawn. Without
         /// getting-up clips, a fall ends the episode. Without locomotion clips, the end of a skill ends it.
-        clip: ClipNames = ClipNames(ALL.into()),
+        clip: Clips = Clips::named(ALL),
         /// Fraction of training episodes that end at a fall instead of waiting until the character is up (0 to 1).
         /// Episodes that start lying never do.
         mortal: Share = Share(0.0),
@@ -139,7 +139,8 @@ impl Default for Controller {
 
 impl Controller {
     fn of(arguments: ControllerArguments) -> Self {
-        let named = |clip: &str| arguments.clip.0 == ALL || arguments.clip.names().contains(&clip);
+        let all = clips::is_all(&arguments.clip);
+        let named = |name: &str| all || arguments.clip.iter().any(|clip| clip.name() == name);
         let does = Does { gait: CLIPS.into_iter().any(named), skills: SKILLS.map(|skill| named(skill.clip)) };
         let ControllerArguments { reach, start, commands, relive, .. } = arguments;
         let steer = Steer::of(SteerArguments { reach, start, commands, relive, ..SteerArguments::default() }, MEMORY);
@@ -189,7 +190,7 @@ impl Agent for Controller {
     }
 
     fn fits(&self, model: &Model) -> Result<(), String> {
-        self.arguments.clip.check_among(&known_clips())?;
+        clips::check(&self.arguments.clip, &known_clips(), false)?;
         super::has_joints(model)
     }
 

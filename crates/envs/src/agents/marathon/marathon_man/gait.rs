@@ -157,7 +157,7 @@ mod tests {
     fn the_walk_and_the_run_are_those_of_the_clips() {
         let gaits = gaits();
         for (name, stride) in [("walk", &gaits.walk), ("run", &gaits.run)] {
-            let clip = clips::find(name).unwrap();
+            let clip = clips::shipped(name).unwrap();
             let from = beginning(&clip);
             let (mut pose, mut velocity) = (vec![0.0; clip.layout().nq()], vec![0.0; clip.layout().nv()]);
             assert!((gaits.frequency(stride.speed) * clip.duration() - 1.0).abs() < 1e-9);

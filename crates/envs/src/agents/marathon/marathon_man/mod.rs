@@ -39,7 +39,8 @@ use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
 use crate::agent::{
-    Agent, Ctrl, Facts, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Seconds, Senses, Start, Terms, names,
+    Agent, Clips, Ctrl, Facts, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Seconds, Senses, Start, Terms,
+    names,
 };
 use crate::any_agent::AnyAgent;
 
@@ -47,7 +48,6 @@ pub use super::imitation::StartAt;
 use super::imitation::{self, sub, turned_to};
 pub use body::Control;
 use body::{ACTIONS, ANATOMY, BUTT, DAMPING_TIME, FIRST_QPOS, FIRST_QVEL, JOINTS, PARTS, TOUCH, TRUNK, model};
-use clips::ClipNames;
 pub use courses::TerrainMarathonMan;
 pub use reward::Reward;
 
@@ -66,7 +66,7 @@ crate::options! {
     pub struct Arguments {
         /// Motion to imitate: the name of a clip, several names separated by commas, or `all` that ship with the crate.
         /// Each episode uses one of them.
-        clip: ClipNames = ClipNames("walk".into()),
+        clip: Clips = Clips::named("walk"),
         /// Reward: `deepmimic` (Peng et al., 2018), `paper` (Booth and Booth, 2019), or `sparse` (distance covered by
         /// the feet, at the end of the episode).
         reward: Reward = Reward::DeepMimic,
@@ -129,7 +129,7 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
     let tasks = [any].into_iter().chain(TASKS).chain([sparse]).enumerate();
     let agent = |(i, (id, clip, summary)): (usize, (&'static str, &str, &'static str))| {
         let reward = if id == sparse.0 { Reward::Sparse } else { Reward::DeepMimic };
-        let arguments = Arguments { clip: ClipNames(clip.into()), reward, ..Arguments::default() };
+        let arguments = Arguments { clip: Clips::named(clip), reward, ..Arguments::default() };
         Arc::new(MarathonMan { id, summary, any_clip: i == 0, arguments }) as Arc<dyn AnyAgent>
     };
     let told: [Arc<dyn AnyAgent>; 2] = [Arc::new(steer::Steer::default()), Arc::new(controller::Controller::default())];
@@ -174,7 +174,7 @@ impl Agent for MarathonMan {
             metrics: names(["forward", "joint_error", "position_error"]),
             parts: names(PARTS),
             touch_sites: names(TOUCH),
-            clips: clip.find(),
+            clips: clips::find(clip),
             follows_clips: *reward != Reward::Sparse,
             memory: if *reward == Reward::Sparse { sparse::MEMORY } else { imitation::MEMORY },
             termination_reward: None,
@@ -192,7 +192,7 @@ impl Agent for MarathonMan {
     }
 
     fn fits(&self, model: &Model) -> Result<(), String> {
-        self.arguments.clip.check()?;
+        clips::check(&self.arguments.clip, &clips::names(), true)?;
         let most = FUTURE.len();
         if self.arguments.future > most {
             return Err(format!("option future is {}, expected 0 to {most}", self.arguments.future));

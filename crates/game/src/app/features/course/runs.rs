@@ -234,6 +234,7 @@ fn follow(
 fn arguments(loaded: &LoadedPolicy) -> String {
     let all = loaded.setting.options.iter().map(|(name, value)| match value {
         Value::Text(text) => format!("{name}={text}"),
+        Value::Clips(clips) => format!("{name}={clips}"),
         other => format!("{name}={other}"),
     });
     all.collect::<Vec<_>>().join(" ")

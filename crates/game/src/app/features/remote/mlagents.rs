@@ -19,8 +19,7 @@ pub fn serve(setting: &Setting, agents: usize, port: u16, threads: usize) -> Res
     let options = setting.options.clone();
     let behavior = BehaviorOptions { env: setting.agent.clone(), agents, options, ..Default::default() };
     let options = PlayerOptions { port, threads: threads.max(1), behaviors: vec![behavior], ..Default::default() };
-    let mut player =
-        setting.with_clips(|| -> Result<Player, GameError> { Ok(Player::connect(&options, Log::to_stderr())?) })?;
+    let mut player = Player::connect(&options, Log::to_stderr())?;
     let behavior = &player.behaviors()[0];
     let spec = Arc::new(behavior.spec().clone());
     let kind = Kind::new(behavior.model().clone(), Some(spec.clone()), spec.dt);

@@ -44,9 +44,8 @@ impl Playback {
     /// # Errors
     /// If there is no such agent.
     pub fn new(recording: Recording) -> Result<Self, GameError> {
-        let Setting { agent, options, .. } = &recording.setting;
-        let make = || -> Result<_, GameError> { Ok(recording.ground.agent_with(agent, options)?.model()?) };
-        let model = Arc::new(recording.setting.with_clips(make)?);
+        let Setting { agent, options } = &recording.setting;
+        let model = Arc::new(recording.ground.agent_with(agent, options)?.model()?);
         let spec = Arc::new(recording.setting.factory()?.spec().clone());
         let kind = Kind::new(model, Some(spec), recording.dt);
         Ok(Playback { recording: Arc::new(recording), kind, at: 0.0 })

@@ -87,25 +87,19 @@ impl TrainingRun {
     pub fn start(setting: &Setting, ground: Ground, options: &TrainingOptions) -> Result<Self, String> {
         let spelled = |error: RunError| error.spelled(&Flags("marathon"));
         let config = settings(setting, options).map_err(spelled)?;
-        let make =
-            || -> Result<_, RunError> { Ok(ground.agent_with(&setting.agent, &setting.options)?.shards(Isa::best())?) };
-        let factory = setting.with_clips(make).map_err(spelled)?;
+        let agent = ground.agent_with(&setting.agent, &setting.options).map_err(|error| spelled(error.into()))?;
+        let factory = agent.shards(Isa::best()).map_err(|error| spelled(error.into()))?;
         let shared = Arc::new((Mutex::new(Shared::default()), Condvar::new()));
         lock(&shared).progress.state = "first steps".into();
         let ours = shared.clone();
-        let (task, clips) = (factory.spec().options.clone(), setting.clips.clone());
         let learn = move || {
-            let noted = |mut policy: Policy| {
-                policy.set_task(task.clone(), clips.clone());
-                Arc::new(policy)
-            };
             let mut observer =
-                |stats: &IterationStats, snapshot: &Snapshot<'_>| observe(&ours, stats, noted(snapshot.policy()));
+                |stats: &IterationStats, snapshot: &Snapshot<'_>| observe(&ours, stats, Arc::new(snapshot.policy()));
             let result = train(&*factory, Isa::best(), &config, None, &mut observer);
             let mut state = lock(&ours);
             state.progress.state = match result {
                 Ok(output) => {
-                    state.newest = Some(noted(output.policy));
+                    state.newest = Some(Arc::new(output.policy));
                     "finished".into()
                 }
                 Err(error) => error.to_string(),

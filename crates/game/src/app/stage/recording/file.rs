@@ -92,9 +92,8 @@ impl Recording {
         if self.grounds.is_empty() {
             return Ok(None);
         }
-        let Setting { agent, options, .. } = &self.setting;
-        let make = || -> Result<_, GameError> { Ok(self.ground.agent_with(agent, options)?.model()?) };
-        let model = self.setting.with_clips(make)?;
+        let Setting { agent, options } = &self.setting;
+        let model = self.ground.agent_with(agent, options)?.model()?;
         let points: Vec<usize> = model.hfields.iter().map(|field| field.nrow * field.ncol).collect();
         let fits = |lie: &&Lie| lie.fields.iter().map(Vec::len).eq(points.iter().copied());
         Ok(self.grounds.iter().find(|lie| !fits(lie)).map(|lie| {
