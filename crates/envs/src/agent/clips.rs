@@ -138,7 +138,7 @@ impl Clips {
         self.0.iter()
     }
 
-    /// Those that are given.
+    /// Names and clips of the given ones.
     pub fn given(&self) -> impl Iterator<Item = (&str, &Arc<Clip>)> {
         self.iter().filter_map(|clip| Some((clip.name(), clip.clip()?)))
     }

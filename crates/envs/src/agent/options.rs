@@ -62,7 +62,7 @@ impl Options {
         self.0.iter().map(|(name, value)| (name.as_str(), value))
     }
 
-    /// Clips that the arguments hold, with their names, each once. Those that come with Marathon are not among them.
+    /// The given clips of all arguments by their names. Clips that come with Marathon have a name alone.
     pub fn given_clips(&self) -> BTreeMap<&str, &Arc<Clip>> {
         let clips = self.0.iter().filter_map(|(_, value)| match value {
             Value::Clips(clips) => Some(clips.given()),
