@@ -13,7 +13,7 @@
 //! ```
 
 use marathon_learn::{
-    Activation, Algorithm, Control, Deviations, EvalOptions, IterationStats, Moving, Ppo, Snapshot, TrainConfig,
+    ActionStd, Activation, Algorithm, Control, EvalOptions, IterationStats, Ppo, Schedule, Snapshot, TrainConfig,
     evaluate, train,
 };
 use marathon_physics::Isa;
@@ -31,18 +31,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     let factory = marathon_envs::factory("walker2d", Isa::best())?;
     // the rest of the settings has defaults; every field is explained in `TrainConfig`
     let ppo = Ppo {
-        entropy_coef: Moving::still(0.0),
-        deviations: Deviations {
-            init_log_std: -0.7,
+        entropy_coef: Schedule::constant(0.0),
+        action_std: ActionStd {
+            init_log: -0.7,
             // it looks for ways at the start and settles on one at the end
-            min_std: Moving { first: 0.35, last: 0.05 },
+            min: Schedule { from: 0.35, to: 0.05 },
             ..Default::default()
         },
         ..Default::default()
     };
     let config = TrainConfig::default().with(|config| {
         (config.run.total_steps, config.run.seed) = (total_steps, 1);
-        (config.network.actor_hidden, config.network.critic_hidden) = (vec![32, 32], vec![32, 32]);
+        config.network.hidden = vec![32, 32];
         config.network.activation = Activation::Tanh;
         config.rewards[0].gamma = 0.98;
         config.algorithm = Algorithm::Ppo(ppo);

@@ -108,10 +108,9 @@ for policy in "${wanted[@]}"; do
       "$marathon" train MarathonManController --config assets/configs/marathon_man_controller-steady.yaml --initialize-from "$runs/leaps" \
         --seed 5 --threads 1 --out "$runs/steady"
       # noise that stays leaves him something to spare; what he loses by it, the other of the mean has
-      sed "s/init_log_std: .*/init_log_std: -2.3/; s/min_std: .*/min_std: 0.1/" \
-        assets/configs/marathon_man_controller-steady.yaml > "$runs/noisy.yaml"
       noisy() {
-        "$marathon" train MarathonManController --config "$runs/noisy.yaml" --threads 1 "$@"
+        "$marathon" train MarathonManController --config assets/configs/marathon_man_controller-steady.yaml \
+          --set ppo.action_std.init_log=-2.3 --set ppo.action_std.min=0.1 --threads 1 "$@"
       }
       # who plays starts from a stand, and is not asked for extremes half of the time
       mean() {

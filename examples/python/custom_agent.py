@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from marathon_envs import MarathonAgent, load_policy
+from marathon_envs import MarathonAgent, train
 
 
 class Inchworm(MarathonAgent):
@@ -44,12 +44,13 @@ class Inchworm(MarathonAgent):
 def learn_natively(steps: int) -> Callable[[np.ndarray], np.ndarray]:
     """Train natively; returns the best actions as a function of the observations."""
 
-    def show(stats: dict) -> None:
-        if stats["episodes"]:
-            print(f"{stats['steps']:9,} steps, return {stats['return_mean']:6.2f}, {stats['speed_mean']:.3f} m/s")
+    def show(row: dict) -> None:
+        if row["episodes"]:
+            print(f"{row['steps']:9,.0f} steps, return {row['return_mean']:6.2f}, {row['speed_mean']:.3f} m/s")
 
-    Inchworm.learn("inchworm.safetensors", agents=256, total_steps=steps, callback=show)
-    return load_policy("inchworm.safetensors")
+    policy = train(Inchworm, {"run": {"agents": 256, "total_steps": steps}}, callback=show).policy
+    policy.save("inchworm.safetensors")
+    return policy
 
 
 def learn_with_sb3(steps: int) -> Callable[[np.ndarray], np.ndarray]:

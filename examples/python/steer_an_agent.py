@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from marathon_envs import CommandRange, MarathonAgent, Tolerance, load_policy
+from marathon_envs import CommandRange, MarathonAgent, Tolerance, train
 
 FASTEST = 2.0
 
@@ -64,8 +64,8 @@ def main() -> None:
     """Learn, then drive by schedule and by command."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--steps", type=int, default=600_000, help="decisions of all rovers together")
-    Rover.learn("rover.safetensors", agents=256, total_steps=parser.parse_args().steps)
-    policy = load_policy("rover.safetensors")
+    policy = train(Rover, {"run": {"agents": 256, "total_steps": parser.parse_args().steps}}).policy
+    policy.save("rover.safetensors")
 
     rovers = Rover.vec_env(16, autoreset="disabled")
     velocity = rovers.spec.observations["velocity"].start

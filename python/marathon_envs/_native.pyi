@@ -27,7 +27,6 @@ __all__ = [
     "_spec",
     "evaluate",
     "ids",
-    "learn",
     "load_policy",
     "main",
     "spec",
@@ -443,8 +442,8 @@ def train(
 
     Args:
         task: its name, or a `MarathonAgent` class, whose functions are called once per decision for all agents.
-        config: a file in the YAML schema of ML-Agents, or a dictionary in the same schema; None means the task's own
-            fast configuration.
+        config: a file, or a dictionary with the same keys, such as ``{"ppo": {"lr": 3e-4}}``. The task's preset holds
+            for what it leaves out. A file of ML-Agents, or a dictionary like one, is imported.
         callback: called after every iteration with the numbers that ``progress.csv`` holds, such as ``steps``,
             ``return_mean`` (None if no episode ended), ``steps_per_second``; if it returns False, training stops.
         seed: seed of everything random.
@@ -731,20 +730,6 @@ class Simulation:
         NaN for those that cannot be evaluated. This costs about as much as a physics step.
         """
     def __len__(self) -> int: ...
-
-def learn(
-    env: Any,
-    config: str,
-    path: str | PathLike[str],
-    callback: Callable[[dict[str, Any]], object] | None = None,
-    checkpoint: str | PathLike[str] | None = None,
-) -> dict[str, Any] | None:
-    """Train a policy for an object with the interface of `VecEnv` and write it to a file.
-
-    `config` is the JSON of the trainer's settings. `callback` is called after every iteration with its statistics; if
-    it returns a false value other than None, training ends. If the folder `checkpoint` holds a checkpoint, training
-    goes on from there; at its end, it holds the newest. Returns the last statistics.
-    """
 
 def ids() -> list[str]:
     """Names of all registered tasks."""

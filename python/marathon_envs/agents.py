@@ -9,8 +9,7 @@ row per agent. The names and values of the helpers are those of the Rust library
 from __future__ import annotations
 
 import inspect
-import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
@@ -20,7 +19,7 @@ import numpy.typing as npt
 
 from marathon_envs._arrays import BoolArray, FloatArray, Streams
 from marathon_envs._joints import JointRotations
-from marathon_envs._native import CommandRange, Model, Simulation, learn
+from marathon_envs._native import CommandRange, Model, Simulation
 
 if TYPE_CHECKING:
     from marathon_envs.agent_env import AgentVecEnv
@@ -436,40 +435,6 @@ class MarathonAgent:
         from marathon_envs.vector import MarathonVectorEnv  # noqa: PLC0415
 
         return MarathonVectorEnv(cls, num_envs, **options)
-
-    @classmethod
-    def learn(
-        cls,
-        path: str | PathLike[str],
-        *,
-        agents: int = 256,
-        threads: int = 0,
-        callback: Callable[[dict[str, Any]], object] | None = None,
-        checkpoint: str | PathLike[str] | None = None,
-        **settings: Any,
-    ) -> dict[str, Any]:
-        """Train a policy with the native trainer and write it to a file, `.safetensors`.
-
-        `marathon_envs.train` does it with configuration files, a folder of results and an evaluation. The trainer calls
-        the agents' functions once per decision for all of them. The same seed gives the same policy for any number of
-        threads. An exception of the agents' functions, or of the callback, ends training.
-
-        Args:
-            path: the file.
-            agents: number of agents that act side by side, a multiple of 16.
-            threads: number of threads; 0 means one per processor core.
-            callback: called after every iteration with a dictionary of its numbers, such as `steps` and `return_mean`;
-                if it returns False, training ends.
-            checkpoint: a folder. If it holds the checkpoint of an earlier call, training goes on from there, with the
-                bits of a training that was never interrupted; at the end, after Ctrl-C too, it holds the newest.
-            settings: the trainer's settings by name, such as `total_steps`, `seed`, `gamma` or `actor_hidden`.
-
-        Returns:
-            The numbers of the last iteration.
-        """
-        env = cls.vec_env(agents, threads=threads, autoreset="same_step")
-        config = json.dumps({"threads": threads, **settings})
-        return learn(env, config, path, callback, checkpoint) or {}
 
 
 def angle(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -176,8 +176,8 @@ def train(
 
     Args:
         task: its name.
-        config: a file in the YAML schema of ML-Agents, or a dictionary in the same schema; None means the task's own
-            fast configuration.
+        config: a file, or a dictionary with the same keys, such as `{"ppo": {"lr": 3e-4}}`; the task's preset holds for
+            what it leaves out.
         workers: number of workers, or prepared `Workers`, which are left open.
         callback: called after every iteration with its numbers, as in `marathon_envs.train`.
         seed: seed of everything random.

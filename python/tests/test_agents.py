@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from marathon_envs import MarathonAgent, Model, Simulation, VecEnv
+from marathon_envs import MarathonAgent, Model, Simulation, VecEnv, train
 from marathon_envs._arrays import Streams
 from marathon_envs.memory import Average, PhaseBonus
 
@@ -401,7 +401,11 @@ def test_a_simulation_reads_what_mujoco_calls_by_the_same_names() -> None:
             call()
 
 
-SETTINGS: dict[str, Any] = {"agents": 48, "horizon": 16, "minibatches": 3, "actor_hidden": [16], "critic_hidden": [16]}
+SETTINGS: dict[str, Any] = {
+    "run": {"agents": 48, "horizon": 16},
+    "network": {"hidden": [16]},
+    "ppo": {"minibatches": 3},
+}
 
 
 def test_the_native_trainer_learns_from_python_with_the_same_bits_for_any_number_of_threads(tmp_path: Path) -> None:
@@ -409,23 +413,23 @@ def test_the_native_trainer_learns_from_python_with_the_same_bits_for_any_number
     for threads in (1, 3):
         path = tmp_path / f"{threads}.safetensors"
         seen: list[int] = []
-        stats = Hopper.learn(
-            path,
-            **SETTINGS,
+        result = train(
+            Hopper,
+            SETTINGS,
             threads=threads,
-            total_steps=4 * 48 * 16,
+            steps=4 * 48 * 16,
             callback=lambda s, seen=seen: seen.append(s["steps"]),
         )
-        assert seen == [48 * 16 * i for i in (1, 2, 3, 4)] and stats["steps"] == seen[-1] and stats["episodes"] > 0
+        assert seen == [48 * 16 * i for i in (1, 2, 3, 4)] and result.steps == seen[-1]
+        result.policy.save(path)
         # the header tells how long it took and on how many threads; these are the numbers of the policy
         files.append(path.read_bytes()[-2500:])
     assert files[0] == files[1]
     # a false answer ends it
-    stats = Hopper.learn(tmp_path / "short", **SETTINGS, total_steps=10**9, callback=lambda s: s["iteration"] < 2)
-    assert stats["iteration"] == 2
+    assert train(Hopper, SETTINGS, callback=lambda s: s["iteration"] < 2).steps == 2 * 48 * 16
 
 
-def test_what_goes_wrong_in_python_ends_training_with_its_own_exception(tmp_path: Path) -> None:
+def test_what_goes_wrong_in_python_ends_training_with_its_own_exception() -> None:
     class Tired(Hopper):
         decisions = 0
 
@@ -437,21 +441,21 @@ def test_what_goes_wrong_in_python_ends_training_with_its_own_exception(tmp_path
 
     for threads in (1, 2):
         with pytest.raises(RuntimeError, match="enough"):
-            Tired.learn(tmp_path / "policy", **SETTINGS, threads=threads)
+            train(Tired, SETTINGS, threads=threads)
 
     def interrupt(_: dict[str, Any]) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        Hopper.learn(tmp_path / "policy", **SETTINGS, callback=interrupt)
-    for settings, message in [
-        ({"agents": 40}, "multiple of 16"),
-        ({"agents": 16, "lr": -1.0}, "lr"),
-        ({"lrr": 1}, "lrr"),
+        train(Hopper, SETTINGS, callback=interrupt)
+    for config, message in [
+        ({"run": {"agents": 40}}, r"config: run.agents: found 40, expected a multiple of 16"),
+        ({"ppo": {"lr": -1.0}}, r"config: ppo.lr: found '-1.0', expected a positive number"),
+        ({"ppo": {"lrr": 1}}, r"config: ppo.lrr: unknown key; did you mean 'lr'"),
+        ({"lr": 1}, r"config: lr: unknown key; did you mean 'ppo.lr'"),
     ]:
         with pytest.raises(ValueError, match=message):
-            Hopper.learn(tmp_path / "policy", **settings)
-    assert not list(tmp_path.iterdir())
+            train(Hopper, config)
 
 
 def test_the_example_runs(tmp_path: Path) -> None:

@@ -19,17 +19,10 @@ class Leg(Arm):
 
 # 64 agents make 2048 steps per iteration
 CONFIG = {
-    "behaviors": {
-        "Arm": {
-            "trainer_type": "ppo",
-            "hyperparameters": {"batch_size": 512, "buffer_size": 2048, "num_epoch": 4, "learning_rate": 3e-3},
-            "network_settings": {"normalize": True, "hidden_units": 16, "num_layers": 1},
-            "reward_signals": {"extrinsic": {"gamma": 0.9}},
-            "max_steps": 40_960,
-            "time_horizon": 32,
-            "marathon": {"agents": 64},
-        }
-    }
+    "run": {"agents": 64, "horizon": 32, "total_steps": 40_960},
+    "network": {"hidden": [16]},
+    "rewards": {"task": {"gamma": 0.9}},
+    "ppo": {"epochs": 4, "minibatches": 4, "lr": 3e-3, "value_lr": 3e-3},
 }
 
 
@@ -78,31 +71,22 @@ def test_a_run_goes_on_with_the_same_bits(tmp_path: Path) -> None:
     assert rest.steps == 8192 and np.array_equal(rest.policy(obs), whole(obs))
 
 
-def test_learn_goes_on_from_a_checkpoint_with_the_same_bits(tmp_path: Path) -> None:
-    settings: dict[str, Any] = {"agents": 32, "horizon": 16, "minibatches": 2, "actor_hidden": [8], "seed": 2}
-    obs, total = Arm.vec_env(40).reset(seed=3), 4 * 32 * 16
-    Arm.learn(tmp_path / "whole", **settings, total_steps=total)
-    first = {"checkpoint": tmp_path / "checkpoint", "callback": lambda stats: stats["iteration"] < 2}
-    assert Arm.learn(tmp_path / "part", **settings, **first, total_steps=total)["iteration"] == 2
-    assert not np.array_equal(load_policy(tmp_path / "part")(obs), load_policy(tmp_path / "whole")(obs))
-    stats = Arm.learn(tmp_path / "part", **settings, checkpoint=tmp_path / "checkpoint", total_steps=total)
-    assert stats["iteration"] == 4 and stats["steps"] == total
-    assert np.array_equal(load_policy(tmp_path / "part")(obs), load_policy(tmp_path / "whole")(obs))
+def test_what_is_learned_until_ctrl_c_is_there(tmp_path: Path) -> None:
+    obs = Arm.vec_env(40).reset(seed=3)
+    settings: dict[str, Any] = {"seed": 2, "steps": 8192}
+    whole = train(Arm, CONFIG, **settings).policy
 
-    # what was learned until Ctrl-C is there
     def interrupt(_: dict[str, Any]) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        Arm.learn(tmp_path / "x", **settings, total_steps=total, checkpoint=tmp_path / "other", callback=interrupt)
-    assert Arm.learn(tmp_path / "x", **settings, total_steps=total, checkpoint=tmp_path / "other")["iteration"] == 4
-    assert np.array_equal(load_policy(tmp_path / "x")(obs), load_policy(tmp_path / "whole")(obs))
-    with pytest.raises(ValueError, match="Leg-v0"):
-        Leg.learn(tmp_path / "x", **settings, checkpoint=tmp_path / "checkpoint")
+        train(Arm, CONFIG, out=tmp_path / "run", callback=interrupt, **settings)
+    assert not np.array_equal(load_policy(tmp_path / "run")(obs), whole(obs))
+    assert np.array_equal(train(Arm, resume=tmp_path / "run").policy(obs), whole(obs))
 
 
 def test_policies_of_classes_are_loaded(tmp_path: Path) -> None:
-    Arm.learn(tmp_path / "arm.safetensors", agents=16, total_steps=1)
+    train(Arm, {"run": {"agents": 16, "total_steps": 1}}).policy.save(tmp_path / "arm.safetensors")
     obs = Arm.vec_env(3).reset(seed=1)
     policy = load_policy(tmp_path / "arm.safetensors")
     assert policy.task == "Arm-v0" and (policy.obs_size, policy.act_size, policy.dt) == (4, 1, 0.05)
@@ -136,15 +120,15 @@ def test_what_goes_wrong_in_python_is_what_is_raised(tmp_path: Path) -> None:
     for threads in (1, 2):
         Tired.decisions = 0
         with pytest.raises(RuntimeError, match="enough"):
-            train(Tired, {"behaviors": {"Tired": CONFIG["behaviors"]["Arm"]}}, threads=threads)
-    Arm.learn(tmp_path / "policy", agents=16, total_steps=1)
+            train(Tired, CONFIG, threads=threads)
+    train(Arm, steps=1, agents=16).policy.save(tmp_path / "policy.safetensors")
     with pytest.raises(RuntimeError, match="enough"):
-        evaluate(load_policy(tmp_path / "policy"), 2, task=type("Arm", (Tired,), {}))
+        evaluate(load_policy(tmp_path / "policy.safetensors"), 2, task=type("Arm", (Tired,), {}))
     with pytest.raises(ValueError, match=r"nowhere\.xml"):
         train(Headless)
     for wrong in (5, object):
         with pytest.raises(TypeError, match="expected a task's name or a MarathonAgent class"):
             train(wrong)
     with pytest.raises(ValueError, match="Leg"):
-        train(Leg, CONFIG)
+        train(Leg, {"behaviors": {"Arm": {"max_steps": 1}}})
     assert not (tmp_path / "runs").exists()

@@ -2,7 +2,6 @@
 
 import copy
 import pickle
-from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -10,7 +9,7 @@ import numpy as np
 import pytest
 
 import marathon_envs
-from marathon_envs import CommandRange, MarathonAgent, VecEnv
+from marathon_envs import CommandRange, MarathonAgent, VecEnv, train
 from marathon_envs._arrays import Streams
 
 CART = """
@@ -160,9 +159,10 @@ def test_gymnasium_environments_take_commands() -> None:
     assert (obs[:, 1] == 0.5).tolist() == [False, True, False]
 
 
-def test_the_native_trainer_learns_from_agents_with_commands(tmp_path: Path) -> None:
-    stats = Cart.learn(tmp_path / "cart.safetensors", agents=16, threads=1, total_steps=4_096, horizon=128)
-    assert stats["steps"] >= 4_096 and np.isfinite(stats["return_mean"])
+def test_the_native_trainer_learns_from_agents_with_commands() -> None:
+    config = {"run": {"agents": 16, "horizon": 128, "total_steps": 4_096}}
+    result = train(Cart, config, threads=1)
+    assert result.steps >= 4_096 and np.isfinite(result.evaluation["return_mean"])
 
 
 @pytest.mark.parametrize(

@@ -21,14 +21,18 @@ ROOT = Path(__file__).parents[2]
 # 64 agents make 4096 steps per iteration
 SMALL = {"agents": 64, "seed": 3, "threads": 2}
 CONFIG = {
+    "run": {"agents": 64, "horizon": 64, "total_steps": 8192},
+    "network": {"hidden": [16], "activation": "elu"},
+    "ppo": {"epochs": 2, "minibatches": 4},
+}
+FOREIGN = {
     "behaviors": {
         "Hopper": {
             "trainer_type": "ppo",
-            "hyperparameters": {"batch_size": 1024, "buffer_size": 4096, "num_epoch": 2},
+            "hyperparameters": {"batch_size": 1024, "buffer_size": 4096},
             "network_settings": {"normalize": True, "hidden_units": 16, "num_layers": 1},
-            "max_steps": 8192,
-            "time_horizon": 64,
-            "marathon": {"agents": 64, "activation": "elu"},
+            "max_steps": 4096,
+            "threaded": True,
         }
     }
 }
@@ -64,11 +68,22 @@ def test_the_same_seed_gives_the_same_policy_here_and_by_the_command(tmp_path: P
 def test_configurations() -> None:
     result = train("hopper", CONFIG)
     assert result.policy.meta["hidden"] == [16] and result.policy.meta["activation"] == "elu"
-    assert result.policy.meta["training"]["config"]["algorithm"]["ppo"]["epochs"] == 2
+    config = result.policy.meta["training"]["config"]
+    assert config["ppo"]["epochs"] == 2
+    # the preset holds for what is left out
+    assert config["ppo"]["action_std"]["min"] == {"from": 0.42, "to": 0.01}
     result = train("hopper", ROOT / "assets/configs/hopper-fast.yaml", steps=100, agents=16)
     assert result.policy.meta["hidden"] == [32, 32]
-    wrong = {"behaviors": {"Hopper": {**CONFIG["behaviors"]["Hopper"], "time_horizn": 3}}}
-    with pytest.raises(ValueError, match=r"config:\d+: behaviors.Hopper.time_horizn: .*time_horizon"):
+    with pytest.raises(ValueError, match="config: ppo.epoch: unknown key; did you mean 'epochs'"):
+        train("hopper", {"ppo": {"epoch": 2}})
+
+
+def test_configurations_of_ml_agents_are_imported_with_notes() -> None:
+    with pytest.warns(UserWarning, match="behaviors.Hopper.threaded has no effect"):
+        result = train("hopper", FOREIGN)
+    assert result.steps == 4096 and result.policy.meta["activation"] == "swish"
+    wrong = {"behaviors": {"Hopper": {**FOREIGN["behaviors"]["Hopper"], "time_horizn": 3}}}
+    with pytest.raises(ValueError, match=r"config: behaviors.Hopper.time_horizn: .*time_horizon"):
         train("hopper", wrong)
 
 
@@ -122,18 +137,18 @@ def test_policies_can_be_copied(obs: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("answer", [None, 0, True, "no", np.True_])
-def test_only_false_stops(answer: object, tmp_path: Path) -> None:
+def test_only_false_stops(answer: object) -> None:
     seen = []
     result = train("hopper", steps=8192, callback=lambda row: seen.append(row) or answer, **SMALL)
     assert len(seen) == 2 and not result.interrupted
     seen.clear()
-    settings = {"agents": 16, "horizon": 16, "minibatches": 1, "epochs": 1, "total_steps": 512}
-    Arm.learn(tmp_path / "policy", **settings, callback=lambda row: seen.append(row) or answer)
+    config = {"run": {"agents": 16, "horizon": 16, "total_steps": 512}, "ppo": {"minibatches": 1, "epochs": 1}}
+    train(Arm, config, callback=lambda row: seen.append(row) or answer)
     assert len(seen) == 2
     for no in (False, np.False_):
         seen.clear()
         assert train("hopper", steps=8192, callback=lambda row, no=no: seen.append(row) or no, **SMALL).interrupted
-        Arm.learn(tmp_path / "policy", **settings, callback=lambda row, no=no: seen.append(row) or no)
+        assert train(Arm, config, callback=lambda row, no=no: seen.append(row) or no).interrupted
         assert len(seen) == 2
 
 

@@ -4,6 +4,7 @@ use crate::bench::BenchArgs;
 use crate::film::Ghost;
 use crate::motion::MotionArgs;
 use clap::{Parser, Subcommand};
+use marathon_learn::Algorithm;
 use marathon_runs::distill::DistillOptions;
 use marathon_runs::{FilmOptions, PolicySource, RunOptions, TaskOptions};
 use std::path::PathBuf;
@@ -12,6 +13,7 @@ const EXAMPLES: &str = "\
 Examples:
   marathon train hopper                         learn to hop; results go to runs/hopper-1
   marathon train MarathonMan --option clip=my.bvh   learn to move as in a recording
+  marathon train hopper --set ppo.lr=3e-4       the same with another setting; `marathon config show hopper` has all
   marathon train hopper --algo acktr            the same by another algorithm: ppo, a2c, acktr
   marathon render runs/hopper-1 --out hop.gif   see it
   marathon eval runs/hopper-1 --episodes 1000   measure it
@@ -61,6 +63,9 @@ pub enum Command {
         /// Agent to tell about: the parts of its observation, its rewards, commands and options.
         agent: Option<String>,
     },
+    /// Show the settings that a task is trained with, or convert a file of ML-Agents.
+    #[command(subcommand)]
+    Config(ConfigCommand),
     /// Make motion capture a character's own: read, retarget, check and draw clips.
     Motion(MotionArgs),
     /// Measure the speed of the physics, the environments or the training.
@@ -93,6 +98,42 @@ pub struct TrainArgs {
     pub agent: Option<String>,
     #[command(flatten)]
     pub run: RunOptions,
+}
+
+/// What `config` does.
+#[derive(Debug, Subcommand)]
+pub enum ConfigCommand {
+    /// Print all settings of a task as YAML: its preset, or what a file and `--set` make of it.
+    Show(ShowArgs),
+    /// Print a file of ML-Agents as one of Marathon's, with notes on what differs.
+    Convert(ConvertArgs),
+}
+
+/// Options of `config show`.
+#[derive(Debug, clap::Args)]
+pub struct ShowArgs {
+    /// Task, such as hopper; see `marathon list`.
+    pub task: String,
+    /// Configuration, Marathon's own or ML-Agents' [default: the task's preset].
+    #[arg(long, value_name = "F.yaml", conflicts_with = "algo")]
+    pub config: Option<PathBuf>,
+    /// Algorithm, with the settings that it starts from in place of the task's preset.
+    #[arg(long, value_name = "NAME", value_parser = Algorithm::NAMES)]
+    pub algo: Option<String>,
+    /// Setting that differs, such as `ppo.lr=3e-4`; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+}
+
+/// Options of `config convert`.
+#[derive(Debug, clap::Args)]
+pub struct ConvertArgs {
+    /// Configuration of ML-Agents: today's (`behaviors:`) or one of ML-Agents 0.x.
+    #[arg(value_name = "IN.yaml")]
+    pub file: PathBuf,
+    /// File to write, .yaml [default: print it].
+    #[arg(long, value_name = "OUT.yaml")]
+    pub out: Option<PathBuf>,
 }
 
 const DISTILL_HELP: &str = "\

@@ -67,6 +67,7 @@ fn dispatch(args: &Args) -> Result<(), CliError> {
         Command::Play(play) => commands::play::run(play),
         Command::List { agent } => commands::list::run(agent.as_deref(), args.json),
         Command::Bench(bench) => bench::run(bench, args.json),
+        Command::Config(command) => commands::config::run(command, args.json),
         Command::RolloutWorker => commands::rollout_worker::run(),
         Command::Motion(what) => motion::run(what, args.json),
     }

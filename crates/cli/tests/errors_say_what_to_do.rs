@@ -28,10 +28,10 @@ fn unknown_names_come_with_the_nearest() {
 #[test]
 fn a_broken_configuration_names_key_and_line() {
     let temp = tempfile::tempdir().unwrap();
-    let config = "behaviors:\n  Hopper:\n    trainer_type: ppo\n    hyperparameters:\n      learning_rat: 3.0e-4\n";
+    let config = "run:\n  agents: 64\nppo:\n  epochs: 4\n  lr_rang: [1e-4, 1e-3]\n";
     std::fs::write(temp.path().join("bad.yaml"), config).unwrap();
     let text = fail(temp.path(), 1, &["train", "hopper", "--config", "bad.yaml"]);
-    says(&text, &["bad.yaml", "5", "learning_rat", "learning_rate"]);
+    says(&text, &["bad.yaml:5: ppo.lr_rang: unknown key; did you mean 'lr_range'?"]);
     says(&fail(temp.path(), 1, &["train", "hopper", "--config", "none.yaml"]), &["none.yaml"]);
     says(&fail(temp.path(), 1, &["train", "hopper", "--agents", "100"]), &["agents is 100", "multiple of 16", "96"]);
     assert!(!temp.path().join("runs").exists(), "an error leaves no folder");
@@ -83,11 +83,11 @@ fn a_changed_description_is_refused() {
             "marathon-policy".into(),
             "a/run.json: format: found \"marathon-policy\", expected \"marathon-run\"",
         ),
-        ("/version", 1.into(), "a/run.json: version: found 1, expected 2, which this program supports"),
-        ("/config/algorithm/ppo/lr", (-1.0).into(), "config.algorithm.ppo.lr: found -1, expected a positive number"),
+        ("/version", 2.into(), "a/run.json: version: found 2, expected 3, which this program supports"),
+        ("/config/ppo/lr", (-1.0).into(), "config.ppo.lr: found -1, expected a positive number"),
         ("/config/run/horizon", 0.into(), "config.run.horizon: found 0, expected at least 1"),
         ("/config/run/horizon", 32.into(), "config.run.horizon: found 32, expected 64, as in checkpoint"),
-        ("/config/rewards/0/gamma", 0.5.into(), "config.rewards[0].gamma: found 0.5, expected 0.9"),
+        ("/config/rewards/task/gamma", 0.5.into(), "config.rewards.task.gamma: found 0.5, expected 0.9"),
         ("/config/run/seed", (-1).into(), "config.run.seed: found 'invalid value: integer `-1`"),
         (
             "/config/run/total_steps",

@@ -265,7 +265,6 @@ behaviors:
     summary_freq: 20000
     checkpoint_interval: 2560
     keep_checkpoints: 3
-    marathon: { agents: 16 }
 ";
 
 /// A row or event that could not be written is written when the iteration is repeated.

@@ -19,8 +19,7 @@ fn run(folder: &Path) -> Vec<PathBuf> {
             checkpoint_interval: 4096
             keep_checkpoints: 3
             max_steps: 12288
-            hyperparameters: {buffer_size: 4096, batch_size: 1024}
-            marathon: {agents: 64}";
+            hyperparameters: {buffer_size: 4096, batch_size: 1024}";
     std::fs::write(folder.join("small.yaml"), config).unwrap();
     succeed(folder, &["train", "hopper", "--config", "small.yaml", "--seed", "1", "--out", "run"]);
     let kept = [4096, 8192, 12288].map(|steps| folder.join(format!("run/policies/policy-{steps}.safetensors")));

@@ -15,7 +15,6 @@ behaviors:
     network_settings: { hidden_units: 8, num_layers: 1, normalize: true }
     max_steps: 1024
     checkpoint_interval: 512
-    marathon: { agents: 16 }
 ";
 
 fn asset(path: &str) -> String {

@@ -76,8 +76,7 @@ fn a_configuration_has_options_and_the_command_line_wins() {
     let temp = tempfile::tempdir().unwrap();
     let path = temp.path();
     let write = |options: &str| {
-        let text = format!("behaviors: {{MarathonMan: {{trainer_type: ppo, marathon: {{options: {options}}}}}}}");
-        std::fs::write(path.join("c.yaml"), text).unwrap();
+        std::fs::write(path.join("c.yaml"), format!("options: {options}")).unwrap();
     };
     write("{clip: run, future: 2, start: first}");
     let words = ["--config", "c.yaml", "--option", "start=random"];
@@ -88,7 +87,7 @@ fn a_configuration_has_options_and_the_command_line_wins() {
 
     write("{strat: first}");
     let text = fail(path, 1, &[&TRAIN[..], &["b", "--config", "c.yaml"]].concat());
-    assert!(text.contains("c.yaml") && text.contains("marathon.options.strat"), "{text}");
+    assert!(text.contains("c.yaml") && text.contains("options.strat"), "{text}");
     assert!(text.contains("did you mean 'start'?"), "{text}");
     write("[first]");
     let text = fail(path, 1, &[&TRAIN[..], &["b", "--config", "c.yaml"]].concat());

@@ -158,7 +158,7 @@ fn another_number_of_agents_keeps_the_buffer() {
     succeed(folder.path(), &["train", "hopper", "--config", file, "--agents", "16", "--steps", "1", "--out", "x"]);
     let config = &read_json(&folder.path().join("x/run.json"))["config"];
     assert_eq!((&config["run"]["agents"], &config["run"]["horizon"]), (&16.into(), &640.into()));
-    assert_eq!(config["algorithm"]["ppo"]["minibatches"], 5);
+    assert_eq!(config["ppo"]["minibatches"], 5);
 }
 
 /// Metrics of the task, with the task's names.

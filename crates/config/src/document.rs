@@ -124,10 +124,30 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Map, ConfigError> {
     match builder.root {
         Some(Node { value: Value::Map(map), .. }) => Ok(map),
         Some(node) => {
-            let problem = format!("found {}, expected a mapping with a section such as 'behaviors:'", node.describe());
+            let problem =
+                format!("found {}, expected a mapping with a section such as 'run:' or 'behaviors:'", node.describe());
             Err(ConfigError::syntax(path, node.line, 1, problem))
         }
-        None => Err(ConfigError::syntax(path, 1, 1, "found nothing, expected a section such as 'behaviors:'")),
+        None => {
+            Err(ConfigError::syntax(path, 1, 1, "found nothing, expected a section such as 'run:' or 'behaviors:'"))
+        }
+    }
+}
+
+/// Takes the lines off what stands for an object of a program.
+pub fn forget_lines(map: &mut Map) {
+    for field in &mut map.entries {
+        field.line = 0;
+        forget(&mut field.node);
+    }
+}
+
+fn forget(node: &mut Node) {
+    node.line = 0;
+    match &mut node.value {
+        Value::Scalar { .. } => {}
+        Value::List(items) => items.iter_mut().for_each(forget),
+        Value::Map(map) => forget_lines(map),
     }
 }
 

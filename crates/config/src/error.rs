@@ -9,15 +9,25 @@ use std::path::{Path, PathBuf};
 pub struct Place {
     /// The file.
     pub file: PathBuf,
-    /// Line of the key, counted from 1.
+    /// Line of the key, counted from 1; 0 where there are no lines.
     pub line: usize,
     /// Names of the sections and the key, joined by dots.
     pub key: String,
 }
 
+impl Place {
+    /// A place without lines.
+    pub(super) fn of(file: &str, key: &str) -> Self {
+        Place { file: file.into(), line: 0, key: key.into() }
+    }
+}
+
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}: {}", self.file.display(), self.line, self.key)
+        match self.line {
+            0 => write!(f, "{}: {}", self.file.display(), self.key),
+            line => write!(f, "{}:{line}: {}", self.file.display(), self.key),
+        }
     }
 }
 
@@ -85,12 +95,10 @@ pub enum ConfigError {
         default: &'static str,
     },
     /// The values do not go together.
-    #[error("{}: {agent}: {source}", path.display())]
+    #[error("{}: {source}", path.display())]
     Combination {
         /// The file.
         path: PathBuf,
-        /// Name of the section.
-        agent: String,
         /// The trainer's complaint.
         source: marathon_learn::Error,
     },

@@ -35,6 +35,12 @@ pub fn accepted(id: &str) -> Vec<&str> {
     names
 }
 
+/// The agent's own name for one of another system.
+pub fn task(name: &str) -> Option<&'static str> {
+    let of_agent = |(_, names): &&(&str, &[&str])| names.iter().any(|known| known.eq_ignore_ascii_case(name));
+    BRAINS.iter().find(of_agent).map(|(agent, _)| *agent)
+}
+
 /// The key among `keys` that speaks of an agent, ignoring case.
 pub fn find<'a>(id: &str, keys: impl Iterator<Item = &'a str> + Clone) -> Option<&'a str> {
     first(accepted(id).into_iter(), keys)

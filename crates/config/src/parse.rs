@@ -1,59 +1,90 @@
-//! What a file says about an agent, and about the roles of a task: the behavior `Tag-v0` speaks of the run and of the first
-//! role, `Tag-v0/opponent` of another. Before the slash stands any name of the task.
+//! From the bytes of a file to the settings of a task.
 
-use super::Loaded;
-use super::error::ConfigError;
-use super::section::Section;
-use super::{convert, current, document, legacy, names};
-use marathon_envs::shard::role_id;
-use marathon_learn::RoleConfig;
-use std::collections::BTreeMap;
+use super::document::{self, Map};
+use super::error::{ConfigError, Place};
+use super::layer::{File, Layer};
+use super::loaded::{Loaded, to_yaml};
+use super::mlagents;
+use super::names;
+use super::presets::default_for;
+use serde_json::{Map as Object, Value as Json};
 use std::path::Path;
 
-/// Reads what the bytes of a file say about an agent, which may go by any of its names; the path is for messages.
+/// Reads what the bytes of a file say about a task, which may go by any of its names; the path is for messages. What a
+/// file of Marathon's leaves out, the task's preset says, unless the file has `preset: false`. A file of ML-Agents has
+/// ML-Agents' defaults.
 ///
 /// # Errors
-/// If the file is no configuration, says nothing about the agent, or asks for what there is not. Messages name file, line and
+/// If the file is no configuration, says nothing about the task, or asks for what there is not. Messages name file, line and
 /// key, what was found and what was expected.
-pub fn parse(path: &Path, bytes: &[u8], agent: &str) -> Result<Loaded, ConfigError> {
-    let map = document::parse(path, bytes)?;
-    let agent = names::id(agent);
-    let behavior = match map.keys().any(|key| current::TOP.contains(&key)) {
-        true => current::read(path, &map, &agent)?,
-        false => legacy::read(path, &map, &agent)?,
-    };
-    convert::convert(path, behavior)
+pub fn parse(path: &Path, bytes: &[u8], task: &str) -> Result<Loaded, ConfigError> {
+    read(path, &document::parse(path, bytes)?, task)
 }
 
-/// Reads what the bytes of a file say about roles of a task but the first, by the roles' names. A role that the file does
-/// not speak of has the settings of the first.
+/// The same for JSON text that stands for an object of a program, which has no lines. `name` is what messages call it.
 ///
 /// # Errors
-/// If the file speaks of a role that there is not, or as for [`parse`].
-pub fn parse_roles(
-    path: &Path,
-    bytes: &[u8],
-    task: &str,
-    roles: &[&str],
-) -> Result<BTreeMap<String, RoleConfig>, ConfigError> {
+/// As [`parse`].
+pub fn parse_object(name: &str, json: &str, task: &str) -> Result<Loaded, ConfigError> {
+    let path = Path::new(name);
+    let mut map = document::parse(path, json.as_bytes())?;
+    document::forget_lines(&mut map);
+    read(path, &map, task)
+}
+
+fn read(path: &Path, map: &Map, task: &str) -> Result<Loaded, ConfigError> {
+    let task = names::id(task);
+    if mlagents::is_from_there(map, &task) {
+        return mlagents::read(path, map, &task);
+    }
+    let file = File::read(path, map)?;
+    let (layer, note) = file.of_task(&task);
+    let base = if file.preset { default_for(&task) } else { Loaded::default() };
+    let mut loaded = base.with(&layer, path)?;
+    loaded.notes.extend(note);
+    Ok(loaded)
+}
+
+/// Puts a setting over a configuration, `KEY=VALUE` with a value in YAML, such as `ppo.lr=3e-4`.
+///
+/// # Errors
+/// If there is no such key, its value is of the wrong kind or does not go with the others, or it is one of another algorithm.
+pub fn set(loaded: Loaded, text: &str) -> Result<Loaded, ConfigError> {
+    let layer = Layer::set(text)?;
+    let own = loaded.config.algorithm.name();
+    match layer.algorithm().filter(|name| *name != own) {
+        Some(other) => {
+            let place = layer.place(other).cloned().unwrap_or_else(|| Place::of("--set", other));
+            Err(ConfigError::value(place, other, format!("{own}, the algorithm of this configuration")))
+        }
+        None => loaded.with(&layer, Path::new("--set")),
+    }
+}
+
+/// A file of ML-Agents as one of Marathon's, in YAML, with notes on what differs there. A behavior becomes a task; tasks
+/// of Marathon go by their own names.
+///
+/// # Errors
+/// If the file is none of ML-Agents, or as for [`parse`].
+pub fn convert(path: &Path, bytes: &[u8]) -> Result<(String, Vec<String>), ConfigError> {
     let map = document::parse(path, bytes)?;
-    let root = Section::root(path, &map);
-    let behaviors = if map.keys().any(|key| current::TOP.contains(&key)) { root.section("behaviors")? } else { root };
-    let keys: Vec<&str> = behaviors.entries().map(|entry| entry.key).collect();
-    let mut found = BTreeMap::new();
-    for role in roles {
-        if let Some(key) = names::find_role(task, role, keys.iter().copied()) {
-            found.insert(role.to_string(), parse(path, bytes, key)?.config.into());
+    let behaviors = mlagents::behaviors(path, &map)?;
+    let (mut tasks, mut notes) = (Object::new(), Vec::new());
+    for behavior in &behaviors {
+        let mut loaded = mlagents::read(path, &map, behavior)?;
+        for note in std::mem::take(&mut loaded.notes) {
+            if !notes.contains(&note) {
+                notes.push(note);
+            }
         }
+        let name = names::task(behavior).filter(|name| !tasks.contains_key(*name)).unwrap_or(behavior);
+        tasks.insert(name.into(), loaded.differences().into());
     }
-    for entry in behaviors.entries() {
-        let Some((name, role)) = entry.key.split_once('/') else { continue };
-        let of_the_task = names::find(task, [name].into_iter()).is_some();
-        if of_the_task && !roles.iter().any(|known| known.eq_ignore_ascii_case(role)) {
-            let ids: Vec<String> = roles.iter().map(|role| role_id(name, role)).collect();
-            let known: Vec<&str> = ids.iter().map(String::as_str).collect();
-            return Err(ConfigError::unknown(entry.place, entry.key, &known));
-        }
+    let mut file = Object::from_iter([("preset".to_string(), Json::Bool(false))]);
+    match behaviors.is_empty() {
+        // the settings that serve all
+        true => file.extend(mlagents::read(path, &map, "")?.differences()),
+        false => _ = file.insert("tasks".into(), tasks.into()),
     }
-    Ok(found)
+    Ok((to_yaml(&file), notes))
 }

@@ -38,11 +38,6 @@ impl<'a> Section<'a> {
         self
     }
 
-    /// Name with dots, of the uppermost mapping.
-    pub fn name(&self) -> &str {
-        self.layers.first().map_or("", |layer| &layer.name)
-    }
-
     pub fn is_empty(&self) -> bool {
         self.layers.iter().all(|layer| layer.map.entries.is_empty())
     }
@@ -154,7 +149,8 @@ impl Range {
                 Range::Finite => true,
             }
     }
-    fn text(self) -> &'static str {
+    /// What is expected.
+    pub fn text(self) -> &'static str {
         match self {
             Range::Positive => "a positive number",
             Range::NotNegative => "a number not below 0",

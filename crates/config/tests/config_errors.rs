@@ -1,4 +1,4 @@
-//! A file that is wrong is refused with file, line, key, what was found and what was expected; harmless settings without
+//! A file of ML-Agents that is wrong is refused with file, line, key, what was found and what was expected; harmless settings without
 //! effect are noted.
 
 use marathon_config::{ConfigError, parse};
@@ -28,8 +28,8 @@ fn refuse_with(text: &str, part: &str) {
 fn what_is_not_yaml_is_refused_with_its_place() {
     refuse_with("behaviors:\n  Hopper: [1, 2\n", "not YAML");
     refuse_with("behaviors:\n\t- x: 3\n", "a/test.yaml:2:");
-    refuse("", "a/test.yaml:1:1: found nothing, expected a section such as 'behaviors:'");
-    refuse("- 1\n", "a/test.yaml:1:1: found a list, expected a mapping with a section such as 'behaviors:'");
+    refuse("", "a/test.yaml:1:1: found nothing, expected a section such as 'run:' or 'behaviors:'");
+    refuse("- 1\n", "a/test.yaml:1:1: found a list, expected a mapping with a section such as 'run:' or 'behaviors:'");
     refuse_with("a: 1\n---\nb: 2\n", "a second document, expected one");
     refuse_with("a: 1\nb: 2\na: 3\n", "a/test.yaml:3:1: found the key 'a' twice");
     refuse_with("a: &x [*x]\n", "contains itself");
@@ -73,7 +73,11 @@ fn unknown_keys_have_a_nearest_one() {
         "3: behaviors.Hopper.max_step: unknown key; did you mean 'max_steps'?",
     );
     refuse_with("behaviors: {Hopper: {network_settings: {xyzzy: 1}}}", "expected one of normalize, hidden_units");
-    refuse_with("behaviors: {Hopper: {marathon: {agnts: 1}}}", "did you mean 'agents'?");
+    // a section that older versions of Marathon read
+    refuse_with(
+        "behaviors: {Hopper: {marathon: {agents: 16}}}",
+        "behaviors.Hopper.marathon: unknown key; expected one of",
+    );
     refuse_with("behaviors: {Hopper: {reward_signals: {extrinsc: {}}}}", "did you mean 'extrinsic'?");
     refuse_with("behaviors: {Hopper: {reward_signals: {extrinsic: {gama: 1}}}}", "did you mean 'gamma'?");
     refuse_with("default_settings:\n  treshold: 3\nbehaviors: {}\n", "2: default_settings.treshold: unknown key");
@@ -117,24 +121,6 @@ fn wrong_values_say_what_would_do() {
             &format!("4: behaviors.Hopper.hyperparameters.{key}: found {found}, expected {expected}"),
         );
     }
-    let marathon = |text: &str| format!("behaviors: {{Hopper: {{marathon: {{{text}}}}}}}");
-    for (text, message) in [
-        ("agents: 100", "found '100', expected a multiple of 16, such as 112, or 1, 2, 4 or 8"),
-        ("agents: 12", "found '12', expected a multiple of 16, such as 16, or 1"),
-        ("agents: 0", "found '0', expected a whole number between 1"),
-        ("activation: gelu", "found 'gelu', expected one of swish, tanh, elu, relu"),
-        ("schedule: cosine", "found 'cosine', expected one of constant, linear, adaptive"),
-        ("lr_range: [3, 1]", "found [3.0, 1.0], expected two positive numbers in ascending order"),
-        ("lr_range: 3", "found '3', expected two positive numbers"),
-        ("lr_range: [1, x]", "found 'x', expected a positive number"),
-        ("actor_hidden: 64", "found '64', expected a list of widths"),
-        ("actor_hidden: [0]", "found '0', expected a whole number between 1 and 65536"),
-        ("scale_rewards: maybe", "found 'maybe', expected true or false"),
-        ("without: [self_play]", "found 'self_play', expected one of curiosity, rnd"),
-        ("without: curiosity", "found 'curiosity', expected a list"),
-    ] {
-        refuse_with(&marathon(text), message);
-    }
     refuse_with("behaviors: {Hopper: {max_steps: 50e63}}", "found '50e63', expected a whole number");
     refuse_with("behaviors: {Hopper: {hyperparameters: 3}}", "found '3', expected a mapping");
     refuse_with("behaviors: {Hopper: 3}", "behaviors.Hopper: found '3', expected a mapping");
@@ -146,15 +132,9 @@ fn wrong_values_say_what_would_do() {
 #[test]
 fn values_that_do_not_go_together_are_refused() {
     refuse(
-        "behaviors: {Hopper: {marathon: {min_std: 3, max_std: 2}}}",
-        "a/test.yaml: behaviors.Hopper: configuration: max_std is 2, expected a number not below the smallest deviation, 3",
+        "behaviors: {Hopper: {trainer_type: sac, hyperparameters: {batch_size: 100}}}",
+        "a/test.yaml: configuration: sac.batch is 100, expected a multiple of 16 up to 1048576",
     );
-    refuse(
-        "behaviors: {Hopper: {trainer_type: a2c, marathon: {schedule: adaptive}}}",
-        "a/test.yaml: behaviors.Hopper: configuration: schedule is adaptive, expected constant or linear with a2c",
-    );
-    let error = error("behaviors: {Hopper: {marathon: {agents: 16, horizon: 2, minibatches: 5}}}").to_string();
-    assert!(error.contains("minibatches is 5, expected at most 2"), "{error}");
 }
 
 #[test]
@@ -239,7 +219,6 @@ fn features_that_are_not_here_are_refused() {
         "Hopper:\n  use_recurrent: true\n",
         "2: Hopper.use_recurrent: recurrent memory is not supported; found 'true'",
     );
-    refuse_with("Hopper:\n  use_recurrent: true\n", "or 'marathon: {without: [memory]}' beside it");
     refuse_with(
         "behaviors: {Hopper: {reward_signals: {extrinsic: {}, rnd: {strenght: 1}}}}",
         "did you mean 'strength'?",
@@ -268,28 +247,12 @@ env_settings: {seed: -1, env_path: null}
 ";
     assert_eq!(notes(off), Vec::<String>::new());
     assert_eq!(notes("Hopper: {use_curiosity: false, use_recurrent: false, memory_size: 256}"), Vec::<String>::new());
-    // switched off by the file itself
-    let without = notes(
-        "behaviors:\n  Hopper:\n    reward_signals: {extrinsic: {}, curiosity: {}}\n    marathon:\n      without: [curiosity]\n",
-    );
-    assert_eq!(
-        without,
-        ["line 3: behaviors.Hopper.reward_signals.curiosity asks for curiosity, which is left out as line 5 allows"]
-    );
 }
 
 #[test]
 fn settings_of_another_trainer_are_noted() {
-    let notes = notes(
-        "behaviors:\n  Hopper:\n    trainer_type: acktr\n    hyperparameters: {epsilon: 0.1}\n    marathon: {rms_decay: 0.9, kl_clip: 0.01}\n",
-    );
-    assert_eq!(
-        notes,
-        [
-            "line 4: behaviors.Hopper.hyperparameters.epsilon has no effect: acktr bounds no ratio",
-            "line 5: behaviors.Hopper.marathon.rms_decay has no effect: acktr has no such setting",
-        ]
-    );
+    let notes = notes("behaviors:\n  Hopper:\n    trainer_type: acktr\n    hyperparameters: {epsilon: 0.1}\n");
+    assert_eq!(notes, ["line 4: behaviors.Hopper.hyperparameters.epsilon has no effect: acktr bounds no ratio",]);
 }
 
 #[test]
@@ -302,7 +265,6 @@ behaviors:
     hyperparameters: {learning_rate_schedule: linear, buffer_size: 4096}
     network_settings: {vis_encode_type: resnet, deterministic: true}
     reward_signals: {extrinsic: {strength: 0.5}}
-    marathon: {agents: 32, horizon: 100, schedule: adaptive}
 env_settings: {num_envs: 4}
 engine_settings: {time_scale: 20}
 torch_settings: {device: cuda}
@@ -311,16 +273,14 @@ checkpoint_settings: {run_id: x}
     let notes = notes(text).join("\n");
     for part in [
         "line 4: behaviors.Hopper.threaded has no effect",
-        "line 5: behaviors.Hopper.time_horizon has no effect: each of the 32 agents adds 100 decisions",
-        "line 6: behaviors.Hopper.hyperparameters.learning_rate_schedule does not move the learning rate",
-        "line 6: behaviors.Hopper.hyperparameters.buffer_size has no effect: 'horizon' of the 'marathon:' section makes rollouts of 3200",
+        "line 5: behaviors.Hopper.time_horizon has no effect: each of the 16 agents adds 256 decisions",
         "line 7: behaviors.Hopper.network_settings.vis_encode_type has no effect",
         "line 7: behaviors.Hopper.network_settings.deterministic has no effect",
         "line 8: behaviors.Hopper.reward_signals.extrinsic.strength has no effect",
-        "line 10: env_settings.num_envs has no effect",
-        "line 11: engine_settings has no effect",
-        "line 12: torch_settings has no effect",
-        "line 13: checkpoint_settings.run_id has no effect",
+        "line 9: env_settings.num_envs has no effect",
+        "line 10: engine_settings has no effect",
+        "line 11: torch_settings has no effect",
+        "line 12: checkpoint_settings.run_id has no effect",
     ] {
         assert!(notes.contains(part), "{part}\n{notes}");
     }

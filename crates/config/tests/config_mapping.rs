@@ -1,10 +1,10 @@
-//! Every key of a configuration file reaches the trainer, in both formats of ML-Agents. This file has PPO's.
+//! Every key of a file of ML-Agents reaches the trainer, in both formats. This file has PPO's.
 
 mod common;
 
 use common::read;
-use marathon_config::{Loaded, default_for, parse};
-use marathon_learn::{Activation, Algorithm, Init, Moving, Ratio, RewardKind, Schedule, TrainConfig};
+use marathon_config::{Loaded, default_for, parse, set};
+use marathon_learn::{Activation, Algorithm, Init, LrSchedule, Ratio, RewardKind, Schedule, TrainConfig};
 use std::path::{Path, PathBuf};
 
 fn asset(name: &str) -> PathBuf {
@@ -31,7 +31,7 @@ struct Flat {
     policy_average: f64,
     seed: u64,
     threads: usize,
-    actor_hidden: Vec<usize>,
+    hidden: Vec<usize>,
     critic_hidden: Vec<usize>,
     activation: Activation,
     initialization: Init,
@@ -46,7 +46,7 @@ struct Flat {
     epochs: usize,
     lr: f64,
     value_lr: f64,
-    schedule: Schedule,
+    lr_schedule: LrSchedule,
     target_kl: f64,
     final_target_kl: Option<f64>,
     lr_range: [f64; 2],
@@ -69,7 +69,7 @@ struct Flat {
 fn flat(loaded: &Loaded) -> Flat {
     let TrainConfig { run, network, statistics, rewards, algorithm, .. } = loaded.config.clone();
     let Algorithm::Ppo(ppo) = algorithm else { panic!("a configuration of {}", algorithm.name()) };
-    let last = |moving: Moving| (moving.last != moving.first).then_some(moving.last);
+    let last = |moving: Schedule| (moving.to != moving.from).then_some(moving.to);
     assert_eq!((rewards.len(), &rewards[0].kind), (1, &RewardKind::Task));
     Flat {
         agents: run.agents,
@@ -79,8 +79,8 @@ fn flat(loaded: &Loaded) -> Flat {
         policy_average: run.policy_average,
         seed: run.seed,
         threads: run.threads,
-        actor_hidden: network.actor_hidden,
-        critic_hidden: network.critic_hidden,
+        critic_hidden: network.critic().to_vec(),
+        hidden: network.hidden,
         activation: network.activation,
         initialization: network.initialization,
         normalize_observations: statistics.normalize_observations,
@@ -94,24 +94,24 @@ fn flat(loaded: &Loaded) -> Flat {
         epochs: ppo.epochs,
         lr: ppo.lr,
         value_lr: ppo.value_lr,
-        schedule: ppo.schedule,
-        target_kl: ppo.target_kl.first,
+        lr_schedule: ppo.lr_schedule,
+        target_kl: ppo.target_kl.from,
         final_target_kl: last(ppo.target_kl),
         lr_range: ppo.lr_range,
         adam_epsilon: ppo.adam_epsilon,
         max_grad_norm: ppo.max_grad_norm,
         gae_lambda: ppo.gae_lambda,
         ratio: ppo.ratio,
-        clip: ppo.clip.first,
+        clip: ppo.clip.from,
         final_clip: last(ppo.clip),
         value_clip: ppo.value_clip,
-        entropy_coef: ppo.entropy_coef.first,
+        entropy_coef: ppo.entropy_coef.from,
         final_entropy_coef: last(ppo.entropy_coef),
-        action_clip: ppo.deviations.action_clip,
-        init_log_std: ppo.deviations.init_log_std,
-        min_std: ppo.deviations.min_std.first,
-        final_min_std: last(ppo.deviations.min_std),
-        max_std: ppo.deviations.max_std,
+        action_clip: ppo.action_clip,
+        init_log_std: ppo.action_std.init_log,
+        min_std: ppo.action_std.min.from,
+        final_min_std: last(ppo.action_std.min),
+        max_std: ppo.action_std.max,
     }
 }
 
@@ -124,12 +124,12 @@ fn what_is_left_out_has_the_value_of_ml_agents() {
         minibatches: 10,
         epochs: 3,
         total_steps: 500_000,
-        actor_hidden: vec![128, 128],
+        hidden: vec![128, 128],
         critic_hidden: vec![128, 128],
         activation: Activation::Swish,
         lr: 3e-4,
         value_lr: 3e-4,
-        schedule: Schedule::Linear,
+        lr_schedule: LrSchedule::Linear,
         max_grad_norm: 1e9,
         gamma: 0.99,
         gae_lambda: 0.95,
@@ -183,11 +183,11 @@ env_settings: {seed: 77}
     let Flat { agents, horizon, minibatches, epochs, total_steps, .. } = flat(&loaded);
     assert_eq!((agents, horizon, minibatches, epochs, total_steps), (64, 128, 16, 5, 2_000_000));
     let ppo = flat(&loaded);
-    assert_eq!((ppo.lr, ppo.value_lr, ppo.schedule), (2e-3, 2e-3, Schedule::Constant));
+    assert_eq!((ppo.lr, ppo.value_lr, ppo.lr_schedule), (2e-3, 2e-3, LrSchedule::Constant));
     assert_eq!((ppo.entropy_coef, ppo.final_entropy_coef), (1e-2, Some(1e-5)));
     assert_eq!((ppo.clip, ppo.final_clip, ppo.value_clip), (0.3, Some(0.1), None));
     assert_eq!((ppo.gae_lambda, ppo.gamma, ppo.normalize_observations), (0.9, 0.995, true));
-    assert_eq!((ppo.actor_hidden, ppo.critic_hidden), (vec![96; 3], vec![96; 3]));
+    assert_eq!((ppo.hidden, ppo.critic_hidden), (vec![96; 3], vec![96; 3]));
     assert_eq!((ppo.seed, loaded.summary_freq), (77, 30_000));
     assert_eq!((loaded.checkpoint_interval, loaded.keep_checkpoints), (70_000, 9));
     assert!(loaded.notes.is_empty(), "{:?}", loaded.notes);
@@ -196,106 +196,22 @@ env_settings: {seed: 77}
 #[test]
 fn schedules_follow_that_of_the_learning_rate_unless_they_have_their_own() {
     let ppo = flat(&current("    hyperparameters: {learning_rate_schedule: constant}\n"));
-    assert_eq!((ppo.schedule, ppo.final_clip, ppo.final_entropy_coef), (Schedule::Constant, None, None));
+    assert_eq!((ppo.lr_schedule, ppo.final_clip, ppo.final_entropy_coef), (LrSchedule::Constant, None, None));
     let ppo = flat(&current("    hyperparameters: {epsilon_schedule: constant, beta_schedule: constant}\n"));
-    assert_eq!((ppo.schedule, ppo.final_clip, ppo.final_entropy_coef), (Schedule::Linear, None, None));
+    assert_eq!((ppo.lr_schedule, ppo.final_clip, ppo.final_entropy_coef), (LrSchedule::Linear, None, None));
     // a decay never raises: both stay
     let ppo = flat(&current("    hyperparameters: {epsilon: 0.05, beta: 0}\n"));
     assert_eq!((ppo.clip, ppo.final_clip, ppo.entropy_coef, ppo.final_entropy_coef), (0.05, None, 0.0, None));
 }
 
 #[test]
-fn every_key_of_marathon_counts() {
-    let loaded = current(
-        "    hyperparameters: {beta: 0.01}
-    marathon:
-      agents: 48
-      horizon: 7
-      policy_average: 0.2
-      minibatches: 6
-      actor_hidden: [33, 17]
-      critic_hidden: [65]
-      activation: elu
-      value_lr: 5e-4
-      schedule: adaptive
-      target_kl: 0.02
-      final_target_kl: 0.004
-      lr_range: [1e-4, 2e-3]
-      max_grad_norm: 0.5
-      value_clip: 0.4
-      ratio: joint
-      adam_epsilon: 1e-6
-      initialization: orthogonal
-      action_clip: 2
-      final_clip: 0.15
-      final_entropy_coef: 0.001
-      init_log_std: -0.7
-      min_std: 0.06
-      final_min_std: 0.04
-      max_std: 1.5
-      follow_statistics: no
-      observation_clip: 8
-      scale_rewards: yes
-      statistics_cap: 1e6
-      seed: 5
-      threads: 2
-",
-    );
-    let expected = Flat {
-        rollouts: 1,
-        policy_average: 0.2,
-        reward_strength: 1.0,
-        agents: 48,
-        horizon: 7,
-        minibatches: 6,
-        epochs: 3,
-        total_steps: 500_000,
-        actor_hidden: vec![33, 17],
-        critic_hidden: vec![65],
-        activation: Activation::Elu,
-        lr: 3e-4,
-        value_lr: 5e-4,
-        schedule: Schedule::Adaptive,
-        target_kl: 0.02,
-        final_target_kl: Some(0.004),
-        lr_range: [1e-4, 2e-3],
-        max_grad_norm: 0.5,
-        gamma: 0.99,
-        gae_lambda: 0.95,
-        clip: 0.2,
-        final_clip: Some(0.15),
-        value_clip: Some(0.4),
-        ratio: Ratio::Joint,
-        adam_epsilon: 1e-6,
-        initialization: Init::Orthogonal,
-        action_clip: 2.0,
-        entropy_coef: 0.01,
-        final_entropy_coef: Some(0.001),
-        init_log_std: -0.7,
-        min_std: 0.06,
-        final_min_std: Some(0.04),
-        max_std: 1.5,
-        normalize_observations: false,
-        follow_statistics: false,
-        observation_clip: 8.0,
-        scale_rewards: true,
-        statistics_cap: 1e6,
-        seed: 5,
-        threads: 2,
-    };
-    assert_eq!(flat(&loaded), expected);
-    let none = flat(&current("    marathon: {value_clip: null, final_clip: ~, final_entropy_coef: null}\n"));
-    assert_eq!((none.value_clip, none.final_clip, none.final_entropy_coef), (None, None, None));
-    // the critic is as wide as the actor unless it has widths of its own
-    assert_eq!(flat(&current("    marathon: {actor_hidden: [40]}\n")).critic_hidden, [40]);
-}
-
-#[test]
 fn the_buffer_is_filled_by_as_many_agents_as_needed() {
     for (agents, horizon) in [(16, 640), (256, 40), (512, 20), (1024, 10), (4096, 3), (16384, 1)] {
-        let ppo = flat(&current(&format!("    marathon: {{agents: {agents}}}\n")));
+        let ppo = flat(&set(current(""), &format!("run.agents={agents}")).unwrap());
         assert_eq!((ppo.agents, ppo.horizon, ppo.minibatches), (agents, horizon, 10));
     }
+    let ppo = flat(&set(current(""), "run.horizon=100").unwrap());
+    assert_eq!((ppo.agents, ppo.horizon), (160, 100));
     let ppo = flat(&current("    time_horizon: 1000\n"));
     assert_eq!((ppo.agents, ppo.horizon), (16, 640));
     let ppo = flat(&current("    hyperparameters: {batch_size: 4096, buffer_size: 2048}\n"));
@@ -319,7 +235,7 @@ behaviors:
 ";
     let hopper = flat(&read(file, "Hopper-v0"));
     assert_eq!((hopper.entropy_coef, hopper.clip, hopper.total_steps), (0.5, 0.3, 1000));
-    assert_eq!(hopper.actor_hidden, [20, 20]);
+    assert_eq!(hopper.hidden, [20, 20]);
     let ant = flat(&read(file, "ant"));
     assert_eq!((ant.clip, ant.total_steps), (0.4, 3000));
     // who is not in the file at all has the defaults
@@ -402,15 +318,15 @@ DeepMindHopperBrain:
 ";
     let hopper = read(file, "hopper");
     assert_eq!((flat(&hopper).entropy_coef, flat(&hopper).gamma), (0.01, 0.995));
-    assert_eq!((flat(&hopper).actor_hidden, flat(&hopper).agents, flat(&hopper).horizon), (vec![90, 90], 16, 640));
+    assert_eq!((flat(&hopper).hidden, flat(&hopper).agents, flat(&hopper).horizon), (vec![90, 90], 16, 640));
     // steps of each of the 16 agents
     assert_eq!((flat(&hopper).total_steps, hopper.summary_freq), (4_800_000, 16_000));
     assert_eq!((hopper.checkpoint_interval, hopper.keep_checkpoints), (800_000, 5));
     assert!(hopper.notes[0].contains("max_steps counts the steps of each agent: 4800000"), "{:?}", hopper.notes);
     let ant = read(file, "ant");
     assert_eq!(
-        (flat(&ant).entropy_coef, flat(&ant).total_steps, flat(&ant).schedule),
-        (0.005, 800_000, Schedule::Linear)
+        (flat(&ant).entropy_coef, flat(&ant).total_steps, flat(&ant).lr_schedule),
+        (0.005, 800_000, LrSchedule::Linear)
     );
 }
 
@@ -423,8 +339,6 @@ Hopper-v0: {max_steps: 1e6, buffer_size: 5120, batch_size: 16, time_horizon: 100
     let hopper = flat(&read(file, "hopper"));
     assert_eq!((hopper.total_steps, hopper.gamma, hopper.agents, hopper.horizon), (1_000_000, 0.98, 48, 107));
     assert_eq!(hopper.minibatches, 320);
-    let each = file.replace("max_steps", "marathon: {steps_per_agent: true}, max_steps");
-    assert_eq!(flat(&read(&each, "hopper")).total_steps, 16_000_000);
 }
 
 #[test]
@@ -438,16 +352,11 @@ fn appendix_b_of_the_paper_loads_for_all_its_agents() {
     ] {
         let loaded = load(&file, agent);
         let (ppo, notes) = (flat(&loaded), loaded.notes);
-        assert_eq!(
-            (ppo.actor_hidden.clone(), ppo.lr, ppo.entropy_coef, ppo.gamma),
-            (widths, lr, beta, gamma),
-            "{agent}"
-        );
+        assert_eq!((ppo.hidden.clone(), ppo.lr, ppo.entropy_coef, ppo.gamma), (widths, lr, beta, gamma), "{agent}");
         assert_eq!((ppo.agents * ppo.horizon, ppo.minibatches, ppo.epochs), (buffer, buffer / 2048, 3), "{agent}");
         assert_eq!((ppo.total_steps, ppo.clip, ppo.gae_lambda), (steps, 0.2, 0.95), "{agent}");
         assert_eq!((ppo.agents, ppo.normalize_observations, ppo.activation), (16, true, Activation::Swish));
-        let curious = notes.iter().any(|n| n.contains("use_curiosity asks for curiosity, which is left out"));
-        assert_eq!(curious, ["hopper", "walker"].contains(&agent), "{notes:?}");
+        assert!(notes.iter().all(|note| note.contains("max_steps") || note.contains("time_horizon")), "{notes:?}");
     }
 }
 
@@ -455,7 +364,7 @@ fn appendix_b_of_the_paper_loads_for_all_its_agents() {
 fn appendix_c_of_the_paper_loads() {
     let loaded = load(&asset("paper-appendix-c.yaml"), "hopper");
     let ppo = flat(&loaded);
-    assert_eq!((ppo.lr, ppo.epochs, ppo.actor_hidden, ppo.total_steps), (3e-3, 10, vec![64, 64], 1_000_000));
+    assert_eq!((ppo.lr, ppo.epochs, ppo.hidden, ppo.total_steps), (3e-3, 10, vec![64, 64], 1_000_000));
     assert_eq!((ppo.agents * ppo.horizon, ppo.minibatches, ppo.entropy_coef), (10240, 5, 5e-3));
 }
 
@@ -473,7 +382,7 @@ fn every_agent_has_a_valid_default() {
         assert!(ppo.normalize_observations && ppo.value_clip.is_none(), "{id}");
         // what a network rewards is not scaled, nor is the task's beside it
         assert_eq!(ppo.scale_rewards, loaded.config.rewards.len() == 1, "{id}");
-        assert_eq!(ppo.schedule, Schedule::Adaptive, "{id}");
+        assert_eq!(ppo.lr_schedule, LrSchedule::Adaptive, "{id}");
     }
     assert_eq!(default_for("walker").config, default_for("Walker2d-v0").config);
     assert_ne!(default_for("hopper").config, default_for("humanoid").config);

@@ -1,6 +1,6 @@
 //! No bytes make the reader of configurations panic, and what it accepts is valid.
 
-use marathon_config::parse;
+use marathon_config::{default_for, parse, set};
 use proptest::prelude::*;
 use std::path::Path;
 
@@ -11,22 +11,29 @@ const FILES: [&str; 3] = [
 ];
 
 /// Pieces of which files are made.
-const PIECES: [&str; 36] = [
+const PIECES: [&str; 43] = [
     "behaviors:",
     "Hopper:",
     "DeepMindHopperBrain:",
     "default:",
     "default_settings:",
     "hyperparameters:",
-    "marathon:",
+    "run:",
+    "ppo:",
+    "rewards:",
+    "amp:",
+    "tasks:",
+    "roles:",
+    "action_std:",
+    "min:",
     "batch_size:",
     "beta:",
     "agents:",
     "max_steps:",
     "lr_range:",
-    "without:",
     "reward_signals:",
     "extrinsic:",
+    "from:",
     " ",
     "\n",
     "\n  ",
@@ -94,7 +101,10 @@ proptest! {
 
     #[test]
     fn on_any_value(key in prop::sample::select(&["max_steps", "beta", "agents", "buffer_size", "hidden_units"][..]), value in "[-+0-9.eE_]{0,24}") {
-        check(format!("Hopper: {{{key}: {value}, marathon: {{{key}: {value}}}}}").as_bytes());
+        check(format!("run: {{{key}: {value}}}").as_bytes());
+        check(format!("ppo: {{{key}: {value}, lr: {value}, clip: {{to: {value}}}}}\nroles: {{a: {{ppo: {{lr: {value}}}}}}}").as_bytes());
+        let _ = set(default_for("hopper"), &format!("{key}={value}"));
+        let _ = set(default_for("hopper"), &format!("ppo.lr={value}"));
         check(format!("Hopper: {{{key}: {value}}}").as_bytes());
         check(format!("behaviors: {{Hopper: {{{key}: {value}, hyperparameters: {{{key}: {value}}}, network_settings: {{{key}: {value}}}}}}}").as_bytes());
     }

@@ -69,7 +69,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let factory = marathon_envs::factory("snail", Isa::best())?;
     let config = TrainConfig::default().with(|config| {
         (config.run.agents, config.run.horizon, config.run.total_steps) = (32, 32, 30_000);
-        config.network.actor_hidden = vec![8];
+        (config.network.hidden, config.network.critic_hidden) = (vec![8], Some(vec![64, 64]));
     });
     let mut quiet = |_: &IterationStats, _: &Snapshot<'_>| Control::Continue;
     let policy = train(&*factory, Isa::best(), &config, None, &mut quiet)?.policy;

@@ -134,7 +134,7 @@ fn roles_hardly_trained(setting: &Setting) -> (Net, Vec<(String, Net)>) {
     let factory = setting.factory().expect("the task exists");
     let config = TrainConfig::default().with(|config| {
         (config.run.agents, config.run.horizon, config.run.total_steps) = (16, 8, 256);
-        config.network.actor_hidden = vec![8];
+        config.network.hidden = vec![8];
     });
     let mut quiet = |_: &IterationStats, _: &Snapshot<'_>| Control::Continue;
     let trained = train(&*factory, Isa::best(), &config, None, &mut quiet).expect("it trains");

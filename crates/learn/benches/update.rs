@@ -91,8 +91,8 @@ fn training() {
 fn run(obs: usize, act: usize, hidden: &[usize], isa: Isa, threads: usize) {
     let config = TrainConfig::default().with(|c| {
         c.run.total_steps = 600_000;
-        c.network.actor_hidden = hidden.to_vec();
-        c.network.critic_hidden = hidden.to_vec();
+        c.network.hidden = hidden.to_vec();
+        c.network.critic_hidden = Some(hidden.to_vec());
         c.run.threads = threads;
     });
     let mut seen: Vec<IterationStats> = Vec::new();

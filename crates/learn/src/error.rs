@@ -12,22 +12,14 @@ pub enum Error {
     /// A configuration value is out of range.
     #[error("configuration: {field} is {found}, expected {expected}")]
     Config {
-        /// Name of the field.
-        field: &'static str,
+        /// Name of the field, with its sections.
+        field: String,
         /// Its value.
         found: String,
         /// Valid values, with the nearest one if there is one.
         expected: String,
     },
-    /// A setting does not exist or has the wrong type.
-    #[error("configuration: {place}: {why}")]
-    Settings {
-        /// Path of the setting.
-        place: String,
-        /// Reason.
-        why: String,
-    },
-    /// Networks do not run with this instruction set, or this processor lacks it.
+    /// The instruction set is not one that networks run on, or not there.
     #[error("instruction set {0} cannot train networks on this processor; use {1}")]
     Isa(&'static str, &'static str),
     /// A run needs more memory than is available.
@@ -112,8 +104,17 @@ impl Error {
             other => other,
         }
     }
-    pub(crate) fn config(field: &'static str, found: impl ToString, expected: impl ToString) -> Self {
-        Error::Config { field, found: found.to_string(), expected: expected.to_string() }
+    /// The same error of a field in a section.
+    pub(crate) fn within(self, section: &str) -> Self {
+        match self {
+            Error::Config { field, found, expected } => {
+                Error::Config { field: format!("{section}.{field}"), found, expected }
+            }
+            other => other,
+        }
+    }
+    pub(crate) fn config(field: impl Into<String>, found: impl ToString, expected: impl ToString) -> Self {
+        Error::Config { field: field.into(), found: found.to_string(), expected: expected.to_string() }
     }
     pub(crate) fn io(path: &Path, action: &'static str) -> impl FnOnce(std::io::Error) -> Self {
         move |source| Error::Io { path: path.into(), action, source }

@@ -104,7 +104,7 @@ fn config(iterations: u64) -> TrainConfig {
         c.run.horizon = 14;
         c.run.total_steps = iterations * c.run.rollout_steps();
         c.run.threads = 1;
-        c.network.critic_hidden = vec![32];
+        c.network.critic_hidden = Some(vec![32]);
         c.rewards[0].gamma = 0.9;
     })
 }

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{PuckTask, ppo, silent, small_config};
-use marathon_learn::{Checkpoint, Control, IterationStats, Moving, Snapshot, TrainConfig, train};
+use marathon_learn::{Checkpoint, Control, IterationStats, Schedule, Snapshot, TrainConfig, train};
 use marathon_physics::lanes::Isa;
 
 fn parameters(config: &TrainConfig, resume: Option<Checkpoint>) -> Vec<f32> {
@@ -26,7 +26,7 @@ fn config(rollouts: u64, clip: f64, final_clip: Option<f64>) -> TrainConfig {
     });
     base.with(|c| {
         c.run.total_steps = rollouts * c.run.rollout_steps();
-        ppo(c).clip = Moving { first: clip, last: final_clip.unwrap_or(clip) };
+        ppo(c).clip = Schedule { from: clip, to: final_clip.unwrap_or(clip) };
     })
 }
 

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{PuckTask, ppo, silent, small_config, small_of};
-use marathon_learn::{Activation, Schedule, TrainConfig, TrainOutput, train};
+use marathon_learn::{Activation, LrSchedule, TrainConfig, TrainOutput, train};
 use marathon_physics::lanes::Isa;
 
 fn run(config: &TrainConfig, isa: Isa) -> TrainOutput {
@@ -28,7 +28,7 @@ fn threads_do_not_change_the_policy() {
         }),
         small_config().with(|c| {
             ppo(c).minibatches = 17;
-            ppo(c).schedule = Schedule::Linear;
+            ppo(c).lr_schedule = LrSchedule::Linear;
             c.network.activation = Activation::Elu;
         }),
         small_of("a2c"),

@@ -4,8 +4,8 @@ mod common;
 
 use common::{PuckTask, learning_config, ppo};
 use marathon_learn::{
-    A2c, Acktr, Activation, Algorithm, Control, IterationStats, Moving, Sac, Schedule, Snapshot, TrainConfig, evaluate,
-    train,
+    A2c, Acktr, Activation, Algorithm, Control, IterationStats, LrSchedule, Sac, Schedule, Snapshot, TrainConfig,
+    evaluate, train,
 };
 use marathon_physics::lanes::Isa;
 
@@ -36,10 +36,10 @@ fn adaptive_rate_solves_the_task() {
 #[test]
 fn linear_rate_with_value_clipping_and_swish_solves_the_task() {
     let config = learning_config().with(|c| {
-        ppo(c).schedule = Schedule::Linear;
+        ppo(c).lr_schedule = LrSchedule::Linear;
         ppo(c).value_clip = Some(0.5);
         c.network.activation = Activation::Swish;
-        ppo(c).entropy_coef.last = 0.0;
+        ppo(c).entropy_coef.to = 0.0;
     });
     assert!(learned(&config) > 52.0);
 }
@@ -48,7 +48,7 @@ fn linear_rate_with_value_clipping_and_swish_solves_the_task() {
 fn constant_rate_with_elu_solves_the_task() {
     assert!(
         learned(&learning_config().with(|c| {
-            ppo(c).schedule = Schedule::Constant;
+            ppo(c).lr_schedule = LrSchedule::Constant;
             c.network.activation = Activation::Elu;
         })) > 52.0
     );
@@ -57,8 +57,8 @@ fn constant_rate_with_elu_solves_the_task() {
 /// With ten times the rate of the paper's comparison, which takes ten times as many steps.
 #[test]
 fn a2c_solves_the_task() {
-    let mut a2c = A2c { lr: 3e-3, entropy_coef: Moving::still(0.0), ..Default::default() };
-    a2c.deviations.init_log_std = -0.5;
+    let mut a2c = A2c { lr: 3e-3, entropy_coef: Schedule::constant(0.0), ..Default::default() };
+    a2c.action_std.init_log = -0.5;
     let config = TrainConfig::a2c().with(|c| {
         c.run.total_steps = 400_000;
         c.run.threads = 1;
@@ -86,8 +86,8 @@ fn sac_solves_the_task_in_a_quarter_of_the_steps() {
     let config = TrainConfig::sac().with(|c| {
         c.algorithm = Algorithm::Sac(sac);
         c.run.total_steps = 100_000;
-        c.network.actor_hidden = vec![32, 32];
-        c.network.critic_hidden = vec![64, 64];
+        c.network.hidden = vec![32, 32];
+        c.network.critic_hidden = Some(vec![64, 64]);
         c.run.threads = 1;
     });
     let output = train(&task, Isa::best(), &config, None, &mut common::silent).unwrap();
@@ -132,14 +132,14 @@ fn impossible_settings_are_refused_with_the_nearest_possible_one() {
     };
     assert_eq!(
         refuse(learning_config().with(|c| c.run.agents = 100)),
-        "configuration: agents is 100, expected a multiple of 16, such as 96, or 1, 2, 4 or 8"
+        "configuration: run.agents is 100, expected a multiple of 16, such as 96, or 1, 2, 4 or 8"
     );
     assert!(refuse(learning_config().with(|c| ppo(c).minibatches = 5000)).contains("at most 256"));
     assert!(refuse(learning_config().with(|c| c.rewards[0].gamma = 1.5)).contains("gamma is 1.5"));
     assert!(refuse(learning_config().with(|c| ppo(c).lr = f64::NAN)).contains("lr is NaN"));
     let isa = train(&PuckTask::new(), Isa::F64, &learning_config(), None, &mut common::silent);
     assert!(isa.err().unwrap().to_string().contains("f64"));
-    let acktr = Algorithm::Acktr(Acktr { schedule: Schedule::Adaptive, ..Default::default() });
+    let acktr = Algorithm::Acktr(Acktr { lr_schedule: LrSchedule::Adaptive, ..Default::default() });
     assert!(refuse(TrainConfig::acktr().with(|c| c.algorithm = acktr)).contains("constant or linear"));
     let acktr = Algorithm::Acktr(Acktr { kl_clip: 0.0, ..Default::default() });
     assert!(refuse(TrainConfig::acktr().with(|c| c.algorithm = acktr)).contains("kl_clip is 0"));
@@ -149,35 +149,39 @@ fn impossible_settings_are_refused_with_the_nearest_possible_one() {
 #[test]
 fn settings_that_mean_nothing_to_an_algorithm_are_refused() {
     for (json, name) in [
-        (r#"{"algorithm": {"a2c": {"epochs": 3}}}"#, "epochs"),
-        (r#"{"algorithm": {"acktr": {"max_grad_norm": 0.5}}}"#, "max_grad_norm"),
-        (r#"{"algorithm": {"sac": {"gae_lambda": 0.9}}}"#, "gae_lambda"),
-        (r#"{"algorithm": {"ppo": {"kl_clip": 0.1}}}"#, "kl_clip"),
+        (r#"{"a2c": {"epochs": 3}}"#, "epochs"),
+        (r#"{"acktr": {"max_grad_norm": 0.5}}"#, "max_grad_norm"),
+        (r#"{"sac": {"gae_lambda": 0.9}}"#, "gae_lambda"),
+        (r#"{"ppo": {"kl_clip": 0.1}}"#, "kl_clip"),
         (r#"{"run": {"lr": 0.1}}"#, "lr"),
+        (r#"{"roles": {"opponent": {"run": {}}}}"#, "run"),
+        (r#"{"rewards": {"rnd": {"share": 0.1}}}"#, "share"),
+        (r#"{"rewards": {"novelty": {}}}"#, "novelty"),
     ] {
         let error = serde_json::from_str::<TrainConfig>(json).unwrap_err().to_string();
         assert!(error.contains(&format!("unknown field `{name}`")), "{error}");
     }
 }
 
-/// Settings by name, as in Python's `MarathonAgent.learn`, find their sections.
+/// What is left out has its default, a number is a schedule that stays, and the section of an algorithm chooses it.
 #[test]
-fn settings_by_name_are_those_of_the_algorithm() {
-    let of = |json| TrainConfig::from_settings(serde_json::from_str(json).unwrap());
-    let config = of(r#"{"total_steps": 512, "gamma": 0.9, "actor_hidden": [8], "epochs": 1, "final_min_std": 0.01}"#);
-    let want = TrainConfig::default().with(|c| {
-        (c.run.total_steps, c.rewards[0].gamma, c.network.actor_hidden) = (512, 0.9, vec![8]);
-        ppo(c).epochs = 1;
-        ppo(c).deviations.min_std.last = 0.01;
-    });
-    assert_eq!(config.unwrap(), want);
-    for (json, text) in [
-        (r#"{"epoch": 1}"#, "configuration: epoch: unknown field `epoch`"),
-        (r#"{"epochs": "x"}"#, "configuration: epochs: invalid type: string"),
-        (r#"{"algorithm": {"a2c": {}}, "target_kl": 0.1}"#, "configuration: target_kl: a2c has no such setting"),
-        (r#"{"algorithm": {"sac": {}}, "gae_lambda": 0.9}"#, "configuration: gae_lambda: sac has no such setting"),
-    ] {
-        let error = of(json).unwrap_err().to_string();
-        assert!(error.starts_with(text), "{error}");
-    }
+fn a_configuration_is_written_by_names_of_its_fields() {
+    let read = |json: &str| serde_json::from_str::<TrainConfig>(json).unwrap();
+    assert_eq!(read("{}"), TrainConfig::default());
+    let config = read(
+        r#"{"run": {"agents": 32}, "network": {"hidden": [8]}, "rewards": {"task": {"gamma": 0.9}, "rnd": {"strength": 0.1}},
+            "ppo": {"clip": 0.3, "action_std": {"min": {"from": 0.4, "to": 0.1}}}, "roles": {"opponent": {"a2c": {"lr": 0.1}}}}"#,
+    );
+    assert_eq!((config.run.agents, config.network.critic(), config.task_reward().gamma), (32, &[8][..], 0.9));
+    assert_eq!((config.rewards.len(), config.rewards[1].kind.name(), config.rewards[1].strength), (2, "rnd", 0.1));
+    let Algorithm::Ppo(ppo) = config.algorithm else { panic!("{config:?}") };
+    assert_eq!((ppo.clip, ppo.action_std.min), (Schedule::constant(0.3), Schedule { from: 0.4, to: 0.1 }));
+    let role = config.of_role("opponent");
+    assert_eq!((role.algorithm.name(), &role.network, role.run), ("a2c", &Default::default(), config.run.clone()));
+    // it is written as it is read, with all fields
+    let written = serde_json::to_value(&config).unwrap();
+    assert_eq!((&written["ppo"]["clip"], &written["ppo"]["epochs"]), (&0.3.into(), &4.into()));
+    assert_eq!(serde_json::from_value::<TrainConfig>(written).unwrap(), config);
+    let two = serde_json::from_str::<TrainConfig>(r#"{"ppo": {}, "sac": {}}"#).unwrap_err().to_string();
+    assert!(two.contains("found ppo and sac, expected the settings of one algorithm"), "{two}");
 }

@@ -7,7 +7,7 @@ mod common;
 use common::numbers::noise_f32 as noise;
 use common::{PuckTask, ppo, silent, small_config, small_of};
 use marathon_learn::nets::mlp::Mlp;
-use marathon_learn::{Activation, Control, Init, IterationStats, Normalizer, Schedule, Snapshot, train};
+use marathon_learn::{Activation, Control, Init, IterationStats, LrSchedule, Normalizer, Snapshot, train};
 use marathon_physics::lanes::Isa;
 
 /// Actions for a row of raw observations after each of four rollouts, whose updates change no parameter by even a bit.
@@ -15,7 +15,7 @@ fn actions(follow_statistics: bool) -> Vec<Vec<f32>> {
     let base = small_config();
     let config = base.with(|c| {
         c.statistics.follow_statistics = follow_statistics;
-        ppo(c).schedule = Schedule::Constant;
+        ppo(c).lr_schedule = LrSchedule::Constant;
         ppo(c).lr = 1e-30;
         ppo(c).value_lr = 1e-30;
         c.network.initialization = Init::MlAgents;

@@ -11,7 +11,7 @@ use safetensors::SafeTensors;
 fn parameters(initialization: Init) -> Vec<f64> {
     let config = small_of("sac").with(|config| {
         config.network.initialization = initialization;
-        (config.network.actor_hidden, config.network.critic_hidden) = (vec![8], vec![400]);
+        (config.network.hidden, config.network.critic_hidden) = (vec![8], Some(vec![400]));
     });
     let trainer = Trainer::new(&PuckTask::new(), Isa::best(), &config).unwrap();
     let folder = tempfile::tempdir().unwrap();

@@ -10,7 +10,7 @@ use std::path::Path;
 
 fn small() -> Policy {
     let config = small_config().with(|c| {
-        c.network.actor_hidden = vec![4];
+        c.network.hidden = vec![4];
         c.run.total_steps = 1;
     });
     train(&PuckTask::new(), Isa::best(), &config, None, &mut silent).unwrap().policy

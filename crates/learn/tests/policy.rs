@@ -10,7 +10,7 @@ use marathon_physics::lanes::Isa;
 fn trained(activation: Activation) -> Policy {
     let config = small_config().with(|c| {
         c.network.activation = activation;
-        c.network.actor_hidden = vec![37, 19];
+        c.network.hidden = vec![37, 19];
         c.run.total_steps = 5000;
     });
     train(&PuckTask::new(), Isa::best(), &config, None, &mut silent).unwrap().policy

@@ -83,7 +83,7 @@ fn checkpoint_of_something_else_is_refused() {
         assert!(error.contains(text), "{error}");
     };
     refuse(small_config().with(|c| c.run.agents = 96), "checkpoint: agents is for 80, expected 96");
-    refuse(small_config().with(|c| c.network.actor_hidden = vec![7]), "actor_hidden is for [13, 8], expected [7]");
+    refuse(small_config().with(|c| c.network.hidden = vec![7]), "hidden is for [13, 8], expected [7]");
     refuse(
         small_of("acktr").with(|c| {
             c.run.agents = 80;
@@ -135,12 +135,12 @@ fn damaged_checkpoints_are_refused() {
         (
             "\"version\": 2",
             "\"version\": 1",
-            "checkpoint.json: version: found 1, expected 2, which this program supports",
+            "checkpoint.json: version: found 1, expected 3, which this program supports",
         ),
         (
             "\"version\": 2",
             "\"version\": 7",
-            "checkpoint.json: version: found 7, expected 2, which this program supports",
+            "checkpoint.json: version: found 7, expected 3, which this program supports",
         ),
         ("\"agents\": 80", "\"agents\": 81", "config.run.agents: found 81, expected a multiple of 16, such as 80"),
         ("\"horizon\": 24", "\"horizon\": -24", "config.run.horizon: found 'invalid value: integer `-24`"),

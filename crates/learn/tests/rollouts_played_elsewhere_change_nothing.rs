@@ -5,8 +5,8 @@ mod common;
 
 use common::{PuckTask, silent, small_config};
 use marathon_learn::{
-    A2c, Algorithm, Checkpoint, Control, Deliver, IterationStats, Novelty, Player, Players, RewardConfig, RewardKind,
-    Schedule, TrainConfig, TrainOutput, train_with,
+    A2c, Algorithm, Checkpoint, Control, Deliver, IterationStats, LrSchedule, Novelty, Player, Players, RewardConfig,
+    RewardKind, TrainConfig, TrainOutput, train_with,
 };
 use marathon_physics::lanes::Isa;
 
@@ -101,7 +101,7 @@ fn rewards_for_novelty_are_played_elsewhere_too() {
 #[test]
 fn iterations_of_several_rollouts_can_be_given_up_halfway() {
     let config = small_config().with(|c| {
-        c.algorithm = Algorithm::A2c(A2c { schedule: Schedule::Constant, ..Default::default() });
+        c.algorithm = Algorithm::A2c(A2c { lr_schedule: LrSchedule::Constant, ..Default::default() });
         c.run.rollouts = 2;
     });
     let want = run(None, &config, None);

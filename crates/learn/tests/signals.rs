@@ -139,5 +139,5 @@ fn novelty_fades_and_the_task_is_solved() {
 fn a_signal_twice_is_refused() {
     let twice = vec![RewardConfig::new(RewardKind::Rnd(Novelty::default())); 2];
     let config = small_config().with(|c| c.rewards.extend(twice));
-    assert!(config.validate().unwrap_err().to_string().contains("rnd twice, expected each kind once"));
+    assert!(config.validate().unwrap_err().to_string().contains("rewards is rnd after rnd, expected each kind once"));
 }

@@ -231,8 +231,8 @@ fn config() -> TrainConfig {
         c.run.agents = 48;
         c.run.horizon = 30;
         c.run.total_steps = 4 * 48 * 30;
-        c.network.actor_hidden = vec![13, 8];
-        c.network.critic_hidden = vec![16];
+        c.network.hidden = vec![13, 8];
+        c.network.critic_hidden = Some(vec![16]);
         c.run.threads = 1;
     })
 }
@@ -241,7 +241,7 @@ fn config() -> TrainConfig {
 fn with_roles() -> TrainConfig {
     config().with(|c| {
         let mut own = RoleConfig::from(c.clone());
-        own.network.actor_hidden = vec![9];
+        own.network.hidden = vec![9];
         own.network.activation = Activation::Relu;
         own.algorithm = Algorithm::A2c(Default::default());
         c.roles.insert("opponent".into(), own);

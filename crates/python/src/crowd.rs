@@ -3,16 +3,13 @@
 
 use crate::error;
 use marathon_envs::{
-    CommandRange, Crowd, CrowdError, Lockstep, Metric, MetricSource, ObsGroup, Options, ShardFactory, Spec, StepMut,
+    CommandRange, Crowd, CrowdError, Lockstep, Metric, MetricSource, ObsGroup, Options, Spec, StepMut,
 };
-use marathon_learn::{Checkpoint, Control, IterationStats, Snapshot, TrainConfig, train};
-use marathon_physics::lanes::Isa;
 use numpy::{AllowTypeChange, Element, PyArray1, PyArrayLikeDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::conversion::FromPyObjectOwned;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::path::PathBuf;
 
 /// Agents behind a Python object with the interface of `VecEnv` that resets in the same step.
 struct PyCrowd {
@@ -163,59 +160,4 @@ pub fn run<R: Send>(py: Python<'_>, crowd: Option<&Lockstep>, f: impl FnOnce() -
 /// Whether training goes on after a callback's answer. Only False stops it: a callback may return nothing, or a number.
 pub fn goes_on(answer: &Bound<'_, PyAny>) -> bool {
     answer.extract::<bool>().unwrap_or(true)
-}
-
-/// Trains a policy for a Python object with the interface of `VecEnv` and writes it to a file.
-///
-/// `config` is the JSON of the trainer's settings; their number of agents is that of the environment. `callback` is called
-/// after every iteration with its statistics, a dictionary; if it returns False, training ends. `checkpoint` is a folder: if
-/// it holds a checkpoint, training goes on from there, and at its end, an interruption's too, it holds the newest. Returns
-/// the last statistics.
-#[pyfunction]
-#[pyo3(signature = (env, config, path, callback = None, checkpoint = None))]
-pub fn learn(
-    py: Python<'_>,
-    env: &Bound<'_, PyAny>,
-    config: &str,
-    path: PathBuf,
-    callback: Option<Py<PyAny>>,
-    checkpoint: Option<PathBuf>,
-) -> PyResult<Option<Py<PyAny>>> {
-    let settings = serde_json::from_str(config).map_err(|e| error::value(format!("config: {e}")))?;
-    let mut config = TrainConfig::from_settings(settings).map_err(error::learn)?;
-    config.run.agents = env.len()?;
-    let factory = lockstep(env)?;
-    let begun = checkpoint.as_ref().filter(|folder| folder.join("checkpoint.json").exists());
-    let resume = begun.map(|folder| Checkpoint::load(folder)).transpose().map_err(error::learn)?;
-    let mut interrupt = None;
-    let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
-        let go_on = Python::attach(|py| -> PyResult<bool> {
-            py.check_signals()?;
-            let Some(callback) = &callback else { return Ok(true) };
-            Ok(goes_on(&callback.bind(py).call1((dictionary(py, stats)?,))?))
-        });
-        match go_on {
-            Ok(true) => Control::Continue,
-            Ok(false) => Control::Stop,
-            Err(e) => {
-                interrupt = Some(e);
-                Control::Stop
-            }
-        }
-    };
-    let learn = || train(&factory as &dyn ShardFactory, Isa::best(), &config, resume, &mut observer);
-    let output = run(py, Some(&factory), learn)?.map_err(error::learn)?;
-    if let Some(folder) = checkpoint {
-        output.checkpoint.save(&folder).map_err(error::learn)?;
-    }
-    if let Some(error) = interrupt {
-        return Err(error);
-    }
-    output.policy.save(&path).map_err(error::learn)?;
-    output.last.map(|stats| dictionary(py, &stats)).transpose()
-}
-
-fn dictionary(py: Python<'_>, stats: &IterationStats) -> PyResult<Py<PyAny>> {
-    let json = serde_json::to_string(stats).map_err(|e| error::value(e.to_string()))?;
-    Ok(py.import("json")?.call_method1("loads", (json,))?.unbind())
 }

@@ -28,7 +28,7 @@ use std::ffi::OsString;
 mod _native {
     #[pymodule_export]
     use super::{
-        clip::_clip, clip::Clip, crowd::learn, main, model::Model, players::Player, policy::_policy, policy::Policy,
+        clip::_clip, clip::Clip, main, model::Model, players::Player, policy::_policy, policy::Policy,
         policy::evaluate, policy::load_policy, renderer::Renderer, simulation::Simulation, spec::_spec,
         spec::CommandRange, spec::Spec, spec::ids, spec::spec, train::TrainResult, train::train, vec_env::VecEnv,
     };

@@ -11,13 +11,13 @@ use pyo3::exceptions::{PyTypeError, PyUserWarning};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::ffi::CString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Where the configuration comes from.
 pub enum Config {
     /// A file.
     Path(PathBuf),
-    /// A dictionary in the schema of the files.
+    /// A dictionary with the keys of the files.
     Table(Py<PyDict>),
 }
 
@@ -73,8 +73,8 @@ impl TrainResult {
 
 /// Trains a policy with the native trainer, without the GIL, and evaluates it.
 ///
-/// `task`: its name, or a `MarathonAgent` class. `config`: a file in the YAML schema of ML-Agents, or a dictionary in the
-/// same schema; without, the task's own fast configuration. `seed`, `steps` (of all agents together), `agents` (a multiple of
+/// `task`: its name, or a `MarathonAgent` class. `config`: a file, or a dictionary with the same keys, such as
+/// `{"ppo": {"lr": 3e-4}}`; the task's preset holds for what it leaves out. `seed`, `steps` (of all agents together), `agents` (a multiple of
 /// 16) and `threads` change it. `callback`: called after every iteration with a dictionary of the numbers that `progress.csv`
 /// holds; if it returns False, training stops. `out`: a new folder for everything that the command `marathon train` writes;
 /// without, nothing is written. `resume`: the folder of a run to go on with, in place of a configuration; the task is needed
@@ -110,7 +110,7 @@ pub fn train(
         _ => arguments::read("", options)?,
     };
     let mut options = RunOptions {
-        learn: LearnOptions { config: None, algo: None, steps, seed, threads },
+        learn: LearnOptions { steps, seed, threads, ..Default::default() },
         task: of_task.into(),
         agents,
         processes: 0,
@@ -128,11 +128,8 @@ pub fn train(
             return Err(error::run(RunError::NewRunOnly { name: "config" }));
         }
         Some(Config::Table(table)) => {
-            // YAML reads JSON
-            let words = PyDict::new(py);
-            words.set_item("indent", 1)?;
-            let text: String = py.import("json")?.call_method("dumps", (table,), Some(&words))?.extract()?;
-            let parse = |id: &str| marathon_config::parse(Path::new("config"), text.as_bytes(), id);
+            let text: String = py.import("json")?.call_method1("dumps", (table,))?.extract()?;
+            let parse = |id: &str| marathon_config::parse_object("config", &text, id);
             loaded = task.as_ref().map(|task| parse(task.id())).transpose().map_err(error::any)?;
         }
     }

@@ -1,15 +1,13 @@
 //! Configuration files on disk.
 
 use crate::error::RunError;
-use marathon_config::{Loaded, parse, parse_roles};
+use marathon_config::{Loaded, default_for, default_of, parse, set};
 use marathon_envs::registry;
-use marathon_learn::RoleConfig;
 use marathon_physics::budget;
 use marathon_physics::hint::{did_you_mean, nearest};
-use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Reads the configuration of an agent from a file, which may use any of the agent's names.
+/// Reads what a file says about a task, which may go by any of its names; what it leaves out, the task's preset says.
 ///
 /// # Errors
 /// If the file cannot be read, or is not a configuration for the agent; see [`parse`].
@@ -21,18 +19,32 @@ pub fn load(path: &Path, agent: &str) -> Result<Loaded, RunError> {
         if let Some((name, value)) = loaded.options.iter().find(|(name, _)| !known.contains(&name.as_str())) {
             let near = did_you_mean(nearest(name, known.iter().copied()));
             let expected = format!("an option of {}: {}{near}", agent.facts().id, known.join(", "));
-            return Err(RunError::file(path, format!("marathon.options.{name}"), value, expected));
+            return Err(RunError::file(path, format!("options.{name}"), value, expected));
         }
     }
     Ok(loaded)
 }
 
-/// Reads the configuration of all roles but the first.
+/// The configuration of a new run: that of a file, the settings that an algorithm starts from, or the preset of the task; with
+/// settings `KEY=VALUE` over it.
 ///
 /// # Errors
-/// If the file cannot be read, or names a role that does not exist; see [`parse_roles`].
-pub fn load_roles(path: &Path, task: &str, roles: &[&str]) -> Result<BTreeMap<String, RoleConfig>, RunError> {
-    Ok(parse_roles(path, &read(path)?, task, roles)?)
+/// If the file or a setting is not usable.
+pub fn of(task: &str, file: Option<&Path>, algorithm: Option<&str>, settings: &[String]) -> Result<Loaded, RunError> {
+    let loaded = match (file, algorithm) {
+        (Some(path), _) => load(path, task)?,
+        (None, Some(name)) => default_of(name),
+        (None, None) => default_for(task),
+    };
+    with(loaded, settings)
+}
+
+/// A configuration with settings `KEY=VALUE` over it.
+///
+/// # Errors
+/// If a setting is not usable.
+pub fn with(loaded: Loaded, settings: &[String]) -> Result<Loaded, RunError> {
+    Ok(settings.iter().try_fold(loaded, |loaded, text| set(loaded, text))?)
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, RunError> {

@@ -19,7 +19,7 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 const FORMAT: &str = "marathon-run";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const RUN: &str = "run.json";
 const LOCK: &str = ".lock";
 const PROGRESS: &str = "progress.csv";

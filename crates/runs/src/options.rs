@@ -14,14 +14,16 @@ use std::sync::Arc;
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct LearnOptions {
-    /// Configuration in the YAML schema of ML-Agents; without it, the agent's own fast one.
+    /// Configuration, Marathon's own or ML-Agents'. The task's preset holds for what Marathon's own leaves out [default: the preset].
     #[cfg_attr(feature = "clap", arg(long, value_name = "F.yaml"))]
     pub config: Option<PathBuf>,
-    /// Algorithm, with the settings that it starts from in place of the agent's own; in a configuration file it is
-    /// `trainer_type`.
+    /// Algorithm, with the settings that it starts from in place of the task's preset.
     #[cfg_attr(feature = "clap", arg(long, value_name = "NAME", value_parser = Algorithm::NAMES))]
     pub algo: Option<String>,
-    /// Agent-steps of the whole run.
+    /// Setting that differs from the configuration, such as `ppo.lr=3e-4`; may be repeated. `marathon config show TASK` lists them.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "KEY=VALUE"))]
+    pub set: Vec<String>,
+    /// Agent-steps of the whole run; short for `--set run.total_steps=N`.
     #[cfg_attr(feature = "clap", arg(long, value_name = "N", value_parser = parse_steps))]
     pub steps: Option<u64>,
     /// Seed of everything random.
@@ -74,9 +76,7 @@ impl LearnOptions {
         }
         match &self.config {
             None => Ok(()),
-            Some(_) => {
-                Err(RunError::option("algo", "and a configuration exclude each other: the file's is trainer_type"))
-            }
+            Some(_) => Err(RunError::option("algo", "and a configuration exclude each other: the file names its own")),
         }
     }
 }
@@ -91,6 +91,7 @@ impl RunOptions {
         let of_new_runs = [
             ("config", self.learn.config.is_some()),
             ("algo", self.learn.algo.is_some()),
+            ("set", !self.learn.set.is_empty()),
             ("seed", self.learn.seed.is_some()),
             ("agents", self.agents.is_some()),
             ("option", !self.task.given.is_empty()),

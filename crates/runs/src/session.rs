@@ -15,7 +15,7 @@ use crate::report::{Reporter, Watch, curve, save, save_policies};
 use crate::setting::{Setting, TaskOptions};
 use crate::task::Task;
 use crate::text::{thousands, whole};
-use marathon_config::{Loaded, default_for, default_of};
+use marathon_config::Loaded;
 use marathon_envs::ShardFactory;
 use marathon_learn::{
     Checkpoint, EvalOptions, Evaluation, IterationStats, Observer, Players, Policy, Snapshot, TrainOutput,
@@ -68,10 +68,10 @@ fn start_from(run: &RunFile, factory: &dyn ShardFactory) -> Result<Option<Checkp
 }
 
 impl Session {
-    /// Starts a new run, or resumes the run in the folder `resume` from its last checkpoint. A new run uses the
-    /// configuration `loaded`, the one in the options' file, or the agent's default one. It has its own folder unless
-    /// `dry`. A resumed run has its task and options from `run.json`; pass the task only if a front end created it.
-    /// Also returns notes on the configuration for the user.
+    /// Starts a new run, or resumes the run in the folder that `resume` names from its last checkpoint. A new run uses
+    /// the configuration `loaded`, the one in the options' file, or the task's preset. It has its own folder
+    /// unless `dry`. A resumed run has its task and arguments from `run.json`; pass the task only if a front end
+    /// created it. Also returns notes on the configuration for the user.
     ///
     /// # Errors
     /// If the options or the configuration are invalid, the task or the folder cannot be created, or there is no such
@@ -99,11 +99,9 @@ impl Session {
     ) -> Result<(Self, Vec<String>), RunError> {
         let learn = &options.learn;
         let agent = task.id().to_string();
-        let mut loaded = match (loaded, &learn.config, &learn.algo) {
-            (Some(loaded), ..) => loaded,
-            (None, Some(path), _) => configuration::load(path, &agent)?,
-            (None, None, Some(name)) => default_of(name),
-            (None, None, None) => default_for(&agent),
+        let mut loaded = match loaded {
+            Some(loaded) => configuration::with(loaded, &learn.set)?,
+            None => configuration::of(&agent, learn.config.as_deref(), learn.algo.as_deref(), &learn.set)?,
         };
         let run = &mut loaded.config.run;
         if let Some(agents) = options.agents {
@@ -120,10 +118,7 @@ impl Session {
         // the user's options come later and have precedence
         let given = loaded.options.iter().chain(&options.task.given).cloned().collect();
         let (factory, setting) = task.with(&TaskOptions { given })?.factory(loaded.config.run.agents)?;
-        if let (Some(path), [_, others @ ..]) = (&learn.config, &factory.spec().roles[..]) {
-            let names: Vec<&str> = others.iter().map(|role| role.name.as_str()).collect();
-            loaded.config.roles = configuration::load_roles(path, &agent, &names)?;
-        }
+        loaded.config.check_roles(factory.spec())?;
         inputs::name_wholly(&mut loaded.config);
         let factory = with_demonstrations(factory, &loaded.config)?;
         loaded.summary_freq = loaded.summary_freq.max(1);

@@ -3,7 +3,7 @@
 use crate::error::StudyError;
 use crate::training::{EPISODES, Run};
 use marathon_envs::registry;
-use marathon_learn::{Algorithm, EvalOptions, Evaluation, Schedule, TrainConfig, evaluate, write_atomic};
+use marathon_learn::{Algorithm, EvalOptions, Evaluation, LrSchedule, TrainConfig, evaluate, write_atomic};
 use marathon_physics::budget;
 use marathon_physics::lanes::Isa;
 use marathon_runs::python::{self, VARIABLE};
@@ -192,7 +192,7 @@ fn finish(answer: &Answer, eval: Evaluation, (who, seed): (&str, u64)) -> Run {
 /// The configuration file of ML-Agents (JSON is YAML).
 fn file(behavior: &str, config: &TrainConfig, time_horizon: u64) -> Value {
     let Algorithm::Ppo(ppo) = &config.algorithm else { unreachable!("the comparison is of PPO") };
-    let schedule = if ppo.schedule == Schedule::Linear { "linear" } else { "constant" };
+    let schedule = if ppo.lr_schedule == LrSchedule::Linear { "linear" } else { "constant" };
     let rollout = config.run.rollout_steps();
     json!({ "behaviors": { behavior: {
         "trainer_type": "ppo",
@@ -201,15 +201,15 @@ fn file(behavior: &str, config: &TrainConfig, time_horizon: u64) -> Value {
             "buffer_size": rollout,
             "learning_rate": ppo.lr,
             "learning_rate_schedule": schedule,
-            "beta": ppo.entropy_coef.first,
-            "epsilon": ppo.clip.first,
+            "beta": ppo.entropy_coef.from,
+            "epsilon": ppo.clip.from,
             "lambd": ppo.gae_lambda,
             "num_epoch": ppo.epochs,
         },
         "network_settings": {
             "normalize": config.statistics.normalize_observations,
-            "hidden_units": config.network.actor_hidden.first(),
-            "num_layers": config.network.actor_hidden.len(),
+            "hidden_units": config.network.hidden.first(),
+            "num_layers": config.network.hidden.len(),
         },
         "reward_signals": { "extrinsic": { "gamma": config.task_reward().gamma, "strength": 1.0 } },
         "max_steps": config.run.total_steps,

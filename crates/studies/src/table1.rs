@@ -55,7 +55,7 @@ pub fn run(options: &Options, peers: &PeerOptions) -> Result<Record, StudyError>
         let of_peers = spread(of_peers.iter().copied());
         let mut row = vec![
             agent.to_string(),
-            format!("{:?}", config.network.actor_hidden),
+            format!("{:?}", config.network.hidden),
             thousands(steps),
             plus_minus(cpu, 0),
             plus_minus(wall, 0),

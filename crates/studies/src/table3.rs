@@ -7,7 +7,7 @@ use crate::record::Record;
 use crate::statistics::{plus_minus, spread};
 use crate::training::{Run, each_seed, mean_curve, train_one};
 use marathon_config as config;
-use marathon_learn::{A2c, Algorithm, Deviations, Moving, Ppo, Schedule, TrainConfig};
+use marathon_learn::{A2c, ActionStd, Algorithm, LrSchedule, Ppo, Schedule, TrainConfig};
 use marathon_runs::report::chart::Chart;
 use std::path::Path;
 
@@ -33,11 +33,11 @@ pub fn ppo2() -> TrainConfig {
         epochs: 10,
         lr: 3e-4,
         value_lr: 3e-4,
-        schedule: Schedule::Linear,
+        lr_schedule: LrSchedule::Linear,
         max_grad_norm: 0.5,
         value_clip: Some(0.2),
-        entropy_coef: Moving::still(0.0),
-        deviations: Deviations::FREE,
+        entropy_coef: Schedule::constant(0.0),
+        action_std: ActionStd::FREE,
         ..Default::default()
     };
     TrainConfig::default().with(|config| {
@@ -52,8 +52,8 @@ fn cases() -> Result<Vec<Case>, StudyError> {
     let faster = TrainConfig::a2c().with(|config| config.algorithm = faster);
     let quieter = |config: TrainConfig| {
         config.with(|config| {
-            if let Some(deviations) = config.algorithm.deviations_mut() {
-                deviations.init_log_std = -0.7;
+            if let Some(action_std) = config.algorithm.action_std_mut() {
+                action_std.init_log = -0.7;
             }
         })
     };

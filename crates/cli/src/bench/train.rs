@@ -88,7 +88,7 @@ fn measure(args: &TrainArgs, threads: usize, id: &str, isa: Isa) -> Result<Row<T
     let factory = task.factory_on(isa)?;
     let mut base = config::default_for(id).config;
     if let Some(width) = args.hidden.map(|width| width as usize) {
-        (base.network.actor_hidden, base.network.critic_hidden) = (vec![width; 2], vec![width; 2]);
+        base.network.hidden = vec![width; 2];
     }
     base.run.agents = args.agents.unwrap_or(base.run.agents);
     let mut samples = Vec::new();

@@ -1,6 +1,7 @@
 //! One file per command.
 
 pub mod average;
+pub mod config;
 pub mod convert;
 pub mod distill;
 pub mod eval;

@@ -10,10 +10,10 @@
 //! The rollout comes from the policy that is updated, so the gradient of the clipped ratio at ratio 1 is that of `A log
 //! pi`. A2C therefore shares PPO's gradient code. The gradient norm is bounded for both networks together.
 
-use super::actor_critic::{self, ActorCritic, Deviations, Layout, refuse_adaptive};
+use super::actor_critic::{self, ActionStd, ActorCritic, Layout, refuse_adaptive};
 use super::loss::{LossSums, Objective};
 use super::on_policy::{OnPolicy, Rule, Student};
-use super::schedule::{Moving, Progress, Schedule};
+use super::schedule::{LrSchedule, Progress, Schedule};
 use super::{Common, Needs, Saved, Setup, Workers, check};
 use crate::error::Error;
 use crate::nets::gaussian::Ratio;
@@ -32,16 +32,19 @@ pub struct A2c {
     /// Learning rate of both networks.
     pub lr: f64,
     /// Schedule of the learning rate.
-    pub schedule: Schedule,
-    /// Bound of the gradient norm of both networks together.
+    pub lr_schedule: LrSchedule,
+    /// Bound of the gradient's norm, for both networks together.
     pub max_grad_norm: f64,
     /// Decay of generalized advantage estimation.
     pub gae_lambda: f64,
     /// Weight of the entropy bonus.
-    pub entropy_coef: Moving,
+    pub entropy_coef: Schedule,
+    /// Bound of the actions drawn, which are then divided by it. ML-Agents has 3: with a larger number the same step of the
+    /// optimizer moves the actions less.
+    pub action_clip: f64,
     /// Standard deviations of the actions.
-    pub deviations: Deviations,
-    /// Weight of the squared error of the value function.
+    pub action_std: ActionStd,
+    /// Weight of the value function's squared error.
     pub value_coef: f64,
     /// Decay of RMSProp's mean square.
     pub rms_decay: f64,
@@ -53,11 +56,12 @@ impl Default for A2c {
     fn default() -> Self {
         Self {
             lr: 3e-4,
-            schedule: Schedule::Linear,
+            lr_schedule: LrSchedule::Linear,
             max_grad_norm: 0.5,
             gae_lambda: 1.0,
-            entropy_coef: Moving::still(0.01),
-            deviations: Deviations::FREE,
+            entropy_coef: Schedule::constant(0.01),
+            action_clip: 1.0,
+            action_std: ActionStd::FREE,
             value_coef: 0.25,
             rms_decay: 0.99,
             rms_epsilon: 1e-5,
@@ -75,11 +79,12 @@ impl A2c {
             ("value_coef", self.value_coef),
             ("rms_epsilon", self.rms_epsilon),
             ("max_grad_norm", self.max_grad_norm),
+            ("action_clip", self.action_clip),
         ])?;
         check::fraction("rms_decay", self.rms_decay)?;
-        refuse_adaptive(self.schedule, "a2c")?;
+        refuse_adaptive(self.lr_schedule, "a2c")?;
         actor_critic::validate(self.lr, self.gae_lambda, self.entropy_coef)?;
-        self.deviations.validate()
+        self.action_std.validate()
     }
 
     /// Memory that a run needs.
@@ -110,7 +115,7 @@ pub struct A2cRule {
 impl A2cRule {
     /// Creates a learner at the start of a run.
     pub fn learner(settings: A2c, setup: &Setup<'_>) -> OnPolicy<Self> {
-        let nets = ActorCritic::new(setup, Ratio::Joint, settings.deviations, settings.gae_lambda);
+        let nets = ActorCritic::new(setup, Ratio::Joint, settings.action_std, settings.gae_lambda);
         let rms = RmsProp::new(nets.params.len(), settings.rms_decay, settings.rms_epsilon);
         OnPolicy::new(nets, settings.lr, 0, Self { settings, rms })
     }
@@ -151,7 +156,7 @@ impl Rule for A2cRule {
         let items: Vec<u32> = (0..experience.items() as u32).collect();
         let objective = objective(progress.at(self.settings.entropy_coef));
         let sums = student.gradient(workers, experience, &items, objective, None);
-        student.lr = self.settings.lr * progress.rate(self.settings.schedule);
+        student.lr = self.settings.lr * progress.rate(self.settings.lr_schedule);
         self.step(student, workers, progress, &sums);
         sums
     }

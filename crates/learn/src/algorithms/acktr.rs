@@ -17,10 +17,10 @@
 //! the running means of the factors. The damping is split between the factors (Martens and Grosse, 2015, section 6.3).
 
 use super::a2c;
-use super::actor_critic::{self, ActorCritic, Deviations, Layout, refuse_adaptive};
+use super::actor_critic::{self, ActionStd, ActorCritic, Layout, refuse_adaptive};
 use super::loss::LossSums;
 use super::on_policy::{OnPolicy, Rule, Student};
-use super::schedule::{Moving, Progress, Schedule};
+use super::schedule::{LrSchedule, Progress, Schedule};
 use super::{Common, Needs, Saved, Setup, Workers, check};
 use crate::error::Error;
 use crate::nets::gaussian::Ratio;
@@ -36,14 +36,17 @@ pub struct Acktr {
     /// Largest step length.
     pub lr: f64,
     /// Schedule of the step length.
-    pub schedule: Schedule,
+    pub lr_schedule: LrSchedule,
     /// Decay of generalized advantage estimation.
     pub gae_lambda: f64,
     /// Weight of the entropy bonus.
-    pub entropy_coef: Moving,
+    pub entropy_coef: Schedule,
+    /// Bound of the actions drawn, which are then divided by it. ML-Agents has 3: with a larger number the same step of the
+    /// optimizer moves the actions less.
+    pub action_clip: f64,
     /// Standard deviations of the actions.
-    pub deviations: Deviations,
-    /// Weight of the squared error of the value function.
+    pub action_std: ActionStd,
+    /// Weight of the value function's squared error.
     pub value_coef: f64,
     /// KL divergence that a step may cause, nats. For the value network: half the mean squared change.
     pub kl_clip: f64,
@@ -61,10 +64,11 @@ impl Default for Acktr {
     fn default() -> Self {
         Self {
             lr: 0.25,
-            schedule: Schedule::Linear,
+            lr_schedule: LrSchedule::Linear,
             gae_lambda: 1.0,
-            entropy_coef: Moving::still(0.01),
-            deviations: Deviations::FREE,
+            entropy_coef: Schedule::constant(0.01),
+            action_clip: 1.0,
+            action_std: ActionStd::FREE,
             value_coef: 0.5,
             kl_clip: 1e-3,
             momentum: 0.9,
@@ -81,7 +85,12 @@ impl Acktr {
     /// # Errors
     /// Names the field, its value and the values that are valid.
     pub fn validate(&self, common: &Common<'_>) -> Result<(), Error> {
-        check::positive(&[("value_coef", self.value_coef), ("kl_clip", self.kl_clip), ("damping", self.damping)])?;
+        check::positive(&[
+            ("value_coef", self.value_coef),
+            ("kl_clip", self.kl_clip),
+            ("damping", self.damping),
+            ("action_clip", self.action_clip),
+        ])?;
         check::fraction("momentum", self.momentum)?;
         check::fraction("stats_decay", self.stats_decay)?;
         if self.inverse_every == 0 {
@@ -89,15 +98,15 @@ impl Acktr {
         }
         // the factors are square matrices
         let network = common.network;
-        for (field, widths) in [("actor_hidden", &network.actor_hidden), ("critic_hidden", &network.critic_hidden)] {
+        for (field, widths) in [("network.hidden", &network.hidden[..]), ("network.critic_hidden", network.critic())] {
             if widths.iter().any(|w| *w > 2048) {
                 return Err(Error::config(field, format!("{widths:?}"), "widths up to 2048 with ACKTR"));
             }
         }
         check::task_alone(common, "acktr")?;
-        refuse_adaptive(self.schedule, "acktr")?;
+        refuse_adaptive(self.lr_schedule, "acktr")?;
         actor_critic::validate(self.lr, self.gae_lambda, self.entropy_coef)?;
-        self.deviations.validate()
+        self.action_std.validate()
     }
 
     /// Memory that a run needs.
@@ -119,7 +128,7 @@ pub struct AcktrRule {
 impl AcktrRule {
     /// Creates a learner at the start of a run.
     pub fn learner(settings: Acktr, setup: &Setup<'_>) -> OnPolicy<Self> {
-        let nets = ActorCritic::new(setup, Ratio::Joint, settings.deviations, settings.gae_lambda);
+        let nets = ActorCritic::new(setup, Ratio::Joint, settings.action_std, settings.gae_lambda);
         let Layout { actor, critic, critic_start, .. } = &nets.layout;
         let kfac = Arc::new(Kfac::new(actor, critic, *critic_start));
         let (moments, momentum) = (Kfac::moments_len(actor, critic), vec![0.0; nets.params.len()]);
@@ -195,7 +204,7 @@ impl Rule for AcktrRule {
             let scale = scale[layer.network];
             layer.natural(nets.isa, gradient, scale);
         });
-        student.lr = settings.lr * progress.rate(settings.schedule);
+        student.lr = settings.lr * progress.rate(settings.lr_schedule);
         self.step(student, progress, scale, &mut sums);
         workers.wait();
         sums

@@ -3,7 +3,7 @@
 
 use super::loss::{Loss, LossSums, Objective};
 use super::parameters::Places;
-use super::schedule::{Moving, Progress, Schedule};
+use super::schedule::{LrSchedule, Progress, Schedule};
 use super::{Description, Needs, Partial, Setup, Workers, check};
 use crate::error::Error;
 use crate::lanes::BLOCK;
@@ -27,55 +27,52 @@ use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 use std::ops::Range;
 
-/// Standard deviations of the actions, which do not depend on the state, and the bound of the actions.
+/// Standard deviations of the actions drawn, which do not depend on the state.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Deviations {
-    /// Bound of the sampled actions, which are then divided by it. Standard deviations refer to the values before the
-    /// division. ML-Agents uses 3: a larger bound makes the same optimizer step move the actions less.
-    pub action_clip: f64,
+pub struct ActionStd {
     /// Logarithm of the standard deviation of the actions at the start.
-    pub init_log_std: f64,
+    pub init_log: f64,
     /// Smallest standard deviation. It keeps a policy exploring after it has found one safe solution.
-    pub min_std: Moving,
+    pub min: Schedule,
     /// Largest standard deviation.
-    pub max_std: f64,
+    pub max: f64,
 }
 
-impl Default for Deviations {
+impl Default for ActionStd {
     fn default() -> Self {
-        Self { action_clip: 1.0, init_log_std: -0.5, min_std: Moving::still(0.05), max_std: 2.0 }
+        Self { init_log: -0.5, min: Schedule::constant(0.05), max: 2.0 }
     }
 }
 
-impl Deviations {
+impl ActionStd {
     /// Practically unbounded deviations that start at 1.
-    pub const FREE: Self = Self { action_clip: 1.0, init_log_std: 0.0, min_std: Moving::still(1e-3), max_std: 1e3 };
+    pub const FREE: Self = Self { init_log: 0.0, min: Schedule::constant(1e-3), max: 1e3 };
 
     /// Checks every field.
     pub fn validate(&self) -> Result<(), Error> {
-        let Moving { first, last } = self.min_std;
-        check::positive(&[("action_clip", self.action_clip), ("min_std", first), ("final_min_std", last)])?;
-        let largest_min = first.max(last);
-        if !(self.max_std.is_finite() && self.max_std >= largest_min) {
+        let Schedule { from, to } = self.min;
+        check::positive(&[("action_std.min", from), ("action_std.min.to", to)])?;
+        let largest_min = from.max(to);
+        if !(self.max.is_finite() && self.max >= largest_min) {
             let expected = format!("a number not below the smallest deviation, {largest_min}");
-            return Err(Error::config("max_std", self.max_std, expected));
+            return Err(Error::config("action_std.max", self.max, expected));
         }
-        match self.init_log_std.is_finite() {
+        match self.init_log.is_finite() {
             true => Ok(()),
-            false => Err(Error::config("init_log_std", self.init_log_std, "a finite number")),
+            false => Err(Error::config("action_std.init_log", self.init_log, "a finite number")),
         }
     }
 }
 
 /// Checks the settings that all actor-critic algorithms have.
-pub fn validate(lr: f64, gae_lambda: f64, entropy_coef: Moving) -> Result<(), Error> {
+pub fn validate(lr: f64, gae_lambda: f64, entropy_coef: Schedule) -> Result<(), Error> {
     check::positive(&[("lr", lr)])?;
     if !(0.0..=1.0).contains(&gae_lambda) {
         return Err(Error::config("gae_lambda", gae_lambda, "a number between 0 and 1"));
     }
-    let Moving { first, last } = entropy_coef;
-    for (field, x) in [("entropy_coef", first), ("final_entropy_coef", last)] {
+    let Schedule { from, to } = entropy_coef;
+    for (field, x) in [("entropy_coef", from), ("entropy_coef.to", to)] {
         if !(x.is_finite() && x >= 0.0) {
             return Err(Error::config(field, x, "a number not below 0"));
         }
@@ -84,10 +81,12 @@ pub fn validate(lr: f64, gae_lambda: f64, entropy_coef: Moving) -> Result<(), Er
 }
 
 /// Refuses the adaptive schedule, which only PPO supports.
-pub fn refuse_adaptive(schedule: Schedule, name: &str) -> Result<(), Error> {
-    match schedule {
-        Schedule::Adaptive => Err(Error::config("schedule", "adaptive", format!("constant or linear with {name}"))),
-        Schedule::Constant | Schedule::Linear => Ok(()),
+pub fn refuse_adaptive(lr_schedule: LrSchedule, name: &str) -> Result<(), Error> {
+    match lr_schedule {
+        LrSchedule::Adaptive => {
+            Err(Error::config("lr_schedule", "adaptive", format!("constant or linear with {name}")))
+        }
+        LrSchedule::Constant | LrSchedule::Linear => Ok(()),
     }
 }
 
@@ -115,8 +114,8 @@ impl Layout {
     pub fn new(setup: &Setup<'_>, ratio: Ratio) -> Self {
         let (obs, act, network) = (setup.spec.obs, setup.spec.act, setup.common.network);
         let net = |hidden: &[usize], out| Mlp::new(&[&[obs], hidden, &[out]].concat(), network.activation);
-        let actor = net(&network.actor_hidden, act);
-        let critic = net(&network.critic_hidden, setup.common.rewards.len());
+        let actor = net(&network.hidden, act);
+        let critic = net(network.critic(), setup.common.rewards.len());
         let mut places = Places::default();
         let of_actor = places.add(actor.len() + act);
         let critic_start = places.add(critic.len()).start;
@@ -153,22 +152,23 @@ pub struct ActorCritic {
     pub params: Vec<f32>,
     /// Instruction set.
     pub isa: Isa,
-    deviations: Deviations,
+    action_clip: f64,
+    action_std: ActionStd,
     lambda: f64,
 }
 
 impl ActorCritic {
     /// Creates the networks at the start of a run.
-    pub fn new(setup: &Setup<'_>, ratio: Ratio, deviations: Deviations, lambda: f64) -> Self {
+    pub fn new(setup: &Setup<'_>, ratio: Ratio, action_std: ActionStd, lambda: f64) -> Self {
         let layout = Layout::new(setup, ratio);
         let mut params = vec![0.0; layout.places.total()];
         let mut random = SplitMix::new(setup.common.seed, PARAMETERS);
         let init = setup.common.network.initialization;
         init.policy(&layout.actor, &mut params, &mut random);
         init.value(&layout.critic, &mut params[layout.critic_start..], &mut random);
-        params[layout.log_std.clone()].fill(deviations.init_log_std as f32);
+        params[layout.log_std.clone()].fill(action_std.init_log as f32);
         Stream::init(&layout.streams, &mut params, setup.common.seed);
-        Self { layout, params, isa: setup.isa, deviations, lambda }
+        Self { layout, params, isa: setup.isa, action_clip: setup.action_clip, action_std, lambda }
     }
 
     /// The policy network's parameters.
@@ -185,7 +185,7 @@ impl ActorCritic {
     }
     /// Factor of the sampled actions, before they are clipped to [-1, 1].
     fn action_scale(&self) -> f32 {
-        1.0 / self.deviations.action_clip as f32
+        1.0 / self.action_clip as f32
     }
     /// Data that is kept per decision.
     pub fn shape(&self) -> Shape {
@@ -297,7 +297,7 @@ impl ActorCritic {
     /// Keeps the standard deviations of the actions within their bounds.
     pub fn bound_std(&mut self, progress: &Progress) {
         let log_std = &mut self.params[self.layout.log_std.clone()];
-        bound_std(log_std, progress.at(self.deviations.min_std), self.deviations.max_std);
+        bound_std(log_std, progress.at(self.action_std.min), self.action_std.max);
     }
 
     /// Adapts both networks to another map of observations, so that their outputs for a raw observation stay the same.

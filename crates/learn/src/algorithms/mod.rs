@@ -27,7 +27,7 @@ use crate::rollout::context::RolloutContext;
 use crate::rollout::data::{Experience, Shape};
 use crate::rollout::statistics::{Statistics, StatisticsConfig};
 use crate::rollout::sums::Totals;
-use actor_critic::Deviations;
+use actor_critic::ActionStd;
 use loss::LossSums;
 use marathon_envs::{Demonstrations, Spec};
 use marathon_physics::lanes::Isa;
@@ -35,12 +35,10 @@ use parameters::Places;
 pub use saved::{Numbers, Saved};
 pub(crate) use saved::{load_adam, save_adam};
 use schedule::Progress;
-use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// An algorithm with its settings.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+/// What learns from the rollouts, with the settings that are its own. In files its name is that of a section.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Algorithm {
     /// Proximal policy optimization.
     Ppo(ppo::Ppo),
@@ -185,21 +183,32 @@ impl Algorithm {
     }
 
     /// Schedule of the learning rate.
-    pub fn schedule(&self) -> schedule::Schedule {
+    pub fn lr_schedule(&self) -> schedule::LrSchedule {
         match self {
-            Algorithm::Ppo(settings) => settings.schedule,
-            Algorithm::A2c(settings) => settings.schedule,
-            Algorithm::Acktr(settings) => settings.schedule,
-            Algorithm::Sac(settings) => settings.schedule,
+            Algorithm::Ppo(settings) => settings.lr_schedule,
+            Algorithm::A2c(settings) => settings.lr_schedule,
+            Algorithm::Acktr(settings) => settings.lr_schedule,
+            Algorithm::Sac(settings) => settings.lr_schedule,
+        }
+    }
+
+    /// Bound of the actions drawn, which are then divided by it.
+    pub fn action_clip(&self) -> f64 {
+        match self {
+            Algorithm::Ppo(settings) => settings.action_clip,
+            Algorithm::A2c(settings) => settings.action_clip,
+            Algorithm::Acktr(settings) => settings.action_clip,
+            // it squashes them
+            Algorithm::Sac(_) => 1.0,
         }
     }
 
     /// Mutable standard deviations of the actions, if they do not depend on the state.
-    pub fn deviations_mut(&mut self) -> Option<&mut Deviations> {
+    pub fn action_std_mut(&mut self) -> Option<&mut ActionStd> {
         match self {
-            Algorithm::Ppo(settings) => Some(&mut settings.deviations),
-            Algorithm::A2c(settings) => Some(&mut settings.deviations),
-            Algorithm::Acktr(settings) => Some(&mut settings.deviations),
+            Algorithm::Ppo(settings) => Some(&mut settings.action_std),
+            Algorithm::A2c(settings) => Some(&mut settings.action_std),
+            Algorithm::Acktr(settings) => Some(&mut settings.action_std),
             Algorithm::Sac(_) => None,
         }
     }
@@ -327,7 +336,7 @@ pub(crate) mod check {
     pub fn positive(list: &[(&'static str, f64)]) -> Result<(), Error> {
         // checked in single precision too, where most of them are used
         match list.iter().find(|(_, x)| !((*x as f32).is_finite() && *x > 0.0)) {
-            Some((field, x)) => Err(Error::config(field, x, "a positive number")),
+            Some((field, x)) => Err(Error::config(*field, x, "a positive number")),
             None => Ok(()),
         }
     }

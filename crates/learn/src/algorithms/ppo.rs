@@ -3,10 +3,10 @@
 //! In each of `epochs` epochs, the rollout of all workers is shuffled and split into minibatches. Each minibatch gives
 //! one step of Adam on the clipped objective of [`loss`](super::loss).
 
-use super::actor_critic::{self, ActorCritic, Deviations, Layout};
+use super::actor_critic::{self, ActionStd, ActorCritic, Layout};
 use super::loss::{LossSums, Objective};
 use super::on_policy::{OnPolicy, Rule, Student};
-use super::schedule::{Moving, Progress, Schedule};
+use super::schedule::{LrSchedule, Progress, Schedule};
 use super::{Common, Needs, Saved, Setup, Workers, check, load_adam, save_adam, share};
 use crate::error::Error;
 use crate::lanes::noise::{SHUFFLES, SplitMix};
@@ -32,9 +32,9 @@ pub struct Ppo {
     #[serde(skip_serializing_if = "is_zero")]
     pub value_warmup: u64,
     /// Schedule of the policy's learning rate.
-    pub schedule: Schedule,
+    pub lr_schedule: LrSchedule,
     /// KL divergence per update that the adaptive schedule aims at, nats. Small values at the end refine a gait.
-    pub target_kl: Moving,
+    pub target_kl: Schedule,
     /// Bounds of the adaptive schedule.
     pub lr_range: [f64; 2],
     /// Constant that Adam adds to the root of the second moment: the smallest gradients that still count.
@@ -46,14 +46,17 @@ pub struct Ppo {
     /// Whether the probability ratio is clipped for all actions together or for each one.
     pub ratio: Ratio,
     /// Clip range of the probability ratio.
-    pub clip: Moving,
-    /// Clip range of the value's change at the start, in units of the scaled return. It shrinks with that of the ratio.
+    pub clip: Schedule,
+    /// Clip range of the value's change (in units of the scaled return) at the start; it shrinks as that of the ratio does.
     /// None by default.
     pub value_clip: Option<f64>,
     /// Weight of the entropy bonus.
-    pub entropy_coef: Moving,
-    /// Standard deviations of the actions.
-    pub deviations: Deviations,
+    pub entropy_coef: Schedule,
+    /// Bound of the actions drawn, which are then divided by it. ML-Agents has 3: with a larger number the same step of the
+    /// optimizer moves the actions less.
+    pub action_clip: f64,
+    /// Standard deviations of the actions drawn.
+    pub action_std: ActionStd,
 }
 
 impl Default for Ppo {
@@ -64,17 +67,18 @@ impl Default for Ppo {
             lr: 1e-3,
             value_lr: 1e-3,
             value_warmup: 0,
-            schedule: Schedule::Adaptive,
-            target_kl: Moving::still(0.015),
+            lr_schedule: LrSchedule::Adaptive,
+            target_kl: Schedule::constant(0.015),
             lr_range: [1e-5, 3e-3],
             adam_epsilon: 1e-5,
             max_grad_norm: 1.0,
             gae_lambda: 0.95,
             ratio: Ratio::Joint,
-            clip: Moving::still(0.2),
+            clip: Schedule::constant(0.2),
             value_clip: None,
-            entropy_coef: Moving::still(0.002),
-            deviations: Deviations::default(),
+            entropy_coef: Schedule::constant(0.002),
+            action_clip: 1.0,
+            action_std: ActionStd::default(),
         }
     }
 }
@@ -98,16 +102,17 @@ impl Ppo {
         check::positive(&[
             ("lr", self.lr),
             ("value_lr", self.value_lr),
-            ("target_kl", self.target_kl.first),
-            ("final_target_kl", self.target_kl.last),
+            ("target_kl", self.target_kl.from),
+            ("target_kl.to", self.target_kl.to),
             ("adam_epsilon", self.adam_epsilon),
             ("max_grad_norm", self.max_grad_norm),
-            ("clip", self.clip.first),
-            ("final_clip", self.clip.last),
+            ("clip", self.clip.from),
+            ("clip.to", self.clip.to),
             ("value_clip", self.value_clip.unwrap_or(1.0)),
+            ("action_clip", self.action_clip),
         ])?;
         actor_critic::validate(self.lr, self.gae_lambda, self.entropy_coef)?;
-        self.deviations.validate()?;
+        self.action_std.validate()?;
         let [low, high] = self.lr_range;
         if !(low > 0.0 && low <= high && high.is_finite()) {
             let found = format!("[{low}, {high}]");
@@ -138,7 +143,7 @@ pub struct PpoRule {
 impl PpoRule {
     /// Creates a learner at the start of a run.
     pub fn learner(settings: Ppo, setup: &Setup<'_>) -> OnPolicy<Self> {
-        let nets = ActorCritic::new(setup, settings.ratio, settings.deviations, settings.gae_lambda);
+        let nets = ActorCritic::new(setup, settings.ratio, settings.action_std, settings.gae_lambda);
         let adam = Adam::new(nets.params.len(), settings.adam_epsilon);
         OnPolicy::new(nets, settings.lr, 0, Self { settings, seed: setup.common.seed, adam })
     }
@@ -151,7 +156,7 @@ impl PpoRule {
         Objective {
             ratio: settings.ratio,
             clip,
-            value_clip: settings.value_clip.map(|range| range * (clip / settings.clip.first)),
+            value_clip: settings.value_clip.map(|range| range * (clip / settings.clip.from)),
             entropy_coef: progress.at(settings.entropy_coef),
             advantage_mean: mean,
             advantage_scale: 1.0 / var.max(1e-12).sqrt(),
@@ -175,7 +180,7 @@ impl PpoRule {
         let scale: Vec<f64> = squares.iter().map(bound).collect();
 
         adam.advance();
-        let part = if settings.schedule == Schedule::Linear { *lr / settings.lr } else { 1.0 };
+        let part = if settings.lr_schedule == LrSchedule::Linear { *lr / settings.lr } else { 1.0 };
         // the first rollout only fills the statistics
         let warms_up = progress.iteration <= settings.value_warmup && settings.value_warmup > 0;
         let rates = nets.layout.rates(if warms_up { 0.0 } else { *lr }, part * settings.value_lr);
@@ -184,7 +189,7 @@ impl PpoRule {
         });
         nets.bound_std(progress);
 
-        if settings.schedule == Schedule::Adaptive && !warms_up {
+        if settings.lr_schedule == LrSchedule::Adaptive && !warms_up {
             let kl = sums.kl * mean;
             let target = progress.at(settings.target_kl);
             if kl > 2.0 * target {
@@ -204,11 +209,11 @@ impl Rule for PpoRule {
         experience: &Experience<'_>,
         progress: &Progress,
     ) -> LossSums {
-        let Ppo { epochs, minibatches, schedule, lr, .. } = self.settings;
+        let Ppo { epochs, minibatches, lr_schedule, lr, .. } = self.settings;
         let objective = self.objective(experience, progress);
         let mut items: Vec<u32> = (0..experience.items() as u32).collect();
-        if schedule == Schedule::Linear {
-            student.lr = lr * progress.rate(Schedule::Linear);
+        if lr_schedule == LrSchedule::Linear {
+            student.lr = lr * progress.rate(LrSchedule::Linear);
         }
         let mut all = LossSums::default();
         for epoch in 0..epochs {

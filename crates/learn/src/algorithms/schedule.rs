@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 /// Schedule of the policy's learning rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Schedule {
-    /// Constant rate.
+pub enum LrSchedule {
+    /// Not at all.
     Constant,
     /// Falls linearly to zero over the run, together with the value function's rate.
     Linear,
@@ -18,18 +18,41 @@ pub enum Schedule {
 
 /// A setting that changes linearly over the run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Moving {
-    /// Value at the start.
-    pub first: f64,
-    /// Value at the end.
-    pub last: f64,
+#[serde(from = "Written", into = "Written")]
+pub struct Schedule {
+    /// At the start.
+    pub from: f64,
+    /// At the end.
+    pub to: f64,
 }
 
-impl Moving {
+impl Schedule {
     /// A constant value.
-    pub const fn still(x: f64) -> Self {
-        Self { first: x, last: x }
+    pub const fn constant(x: f64) -> Self {
+        Self { from: x, to: x }
+    }
+}
+
+/// A schedule in files.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(untagged, deny_unknown_fields, expecting = "expected a number, or {from: A, to: B}")]
+enum Written {
+    Constant(f64),
+    Linear { from: f64, to: f64 },
+}
+
+impl From<Written> for Schedule {
+    fn from(written: Written) -> Self {
+        match written {
+            Written::Constant(x) => Self::constant(x),
+            Written::Linear { from, to } => Self { from, to },
+        }
+    }
+}
+
+impl From<Schedule> for Written {
+    fn from(Schedule { from, to }: Schedule) -> Self {
+        if from.to_bits() == to.to_bits() { Self::Constant(from) } else { Self::Linear { from, to } }
     }
 }
 
@@ -46,17 +69,17 @@ pub struct Progress {
 
 impl Progress {
     /// The current value of a setting.
-    pub fn at(&self, setting: Moving) -> f64 {
+    pub fn at(&self, setting: Schedule) -> f64 {
         let part = (self.steps as f64 / self.total_steps as f64).min(1.0);
-        setting.first + (setting.last - setting.first) * part
+        setting.from + (setting.to - setting.from) * part
     }
 
     /// Factor of a learning rate at this moment: falls to 0 under the linear schedule, 1 under the others.
-    pub fn rate(&self, schedule: Schedule) -> f64 {
+    pub fn rate(&self, schedule: LrSchedule) -> f64 {
         match schedule {
-            // several rollouts per iteration may pass the end
-            Schedule::Linear => (1.0 - self.steps as f64 / self.total_steps as f64).max(0.0),
-            Schedule::Constant | Schedule::Adaptive => 1.0,
+            // an iteration of several rollouts may lead beyond the end
+            LrSchedule::Linear => (1.0 - self.steps as f64 / self.total_steps as f64).max(0.0),
+            LrSchedule::Constant | LrSchedule::Adaptive => 1.0,
         }
     }
 }

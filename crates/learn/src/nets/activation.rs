@@ -19,6 +19,8 @@ pub enum Activation {
 }
 
 impl Activation {
+    /// Names in configurations and files.
+    pub const NAMES: [&str; 4] = ["swish", "tanh", "elu", "relu"];
     /// All of them.
     pub const ALL: [Activation; 4] = [Activation::Swish, Activation::Tanh, Activation::Elu, Activation::Relu];
 

@@ -23,10 +23,7 @@ pub enum Ratio {
 }
 
 impl Ratio {
-    /// Names in configurations.
-    pub const NAMED: [(&str, Self); 2] = [("joint", Self::Joint), ("per_action", Self::PerAction)];
-
-    /// Log-probabilities stored per sample.
+    /// Numbers that a sample's log-probability is kept as.
     pub fn rows(self, actions: usize) -> usize {
         match self {
             Ratio::Joint => 1,

@@ -17,9 +17,6 @@ pub enum Init {
 }
 
 impl Init {
-    /// Names in configurations.
-    pub const NAMED: [(&str, Self); 2] = [("orthogonal", Self::Orthogonal), ("ml_agents", Self::MlAgents)];
-
     /// Fills the parameters of a policy's network.
     pub(crate) fn policy(self, net: &Mlp, params: &mut [f32], random: &mut SplitMix) {
         match self {

@@ -20,9 +20,9 @@ use serde::{Deserialize, Serialize};
 #[serde(default, deny_unknown_fields)]
 pub struct NetworkConfig {
     /// Widths of the policy's hidden layers.
-    pub actor_hidden: Vec<usize>,
-    /// Widths of the value function's hidden layers.
-    pub critic_hidden: Vec<usize>,
+    pub hidden: Vec<usize>,
+    /// Widths of the value function's hidden layers; none: those of the policy's.
+    pub critic_hidden: Option<Vec<usize>>,
     /// Activation of all hidden layers.
     pub activation: Activation,
     /// Initial weights of the networks.
@@ -31,10 +31,9 @@ pub struct NetworkConfig {
 
 impl Default for NetworkConfig {
     fn default() -> Self {
-        let hidden = vec![64, 64];
         Self {
-            actor_hidden: hidden.clone(),
-            critic_hidden: hidden,
+            hidden: vec![64, 64],
+            critic_hidden: None,
             activation: Activation::Tanh,
             initialization: Init::Orthogonal,
         }
@@ -42,12 +41,17 @@ impl Default for NetworkConfig {
 }
 
 impl NetworkConfig {
+    /// Widths of the value function's hidden layers.
+    pub fn critic(&self) -> &[usize] {
+        self.critic_hidden.as_deref().unwrap_or(&self.hidden)
+    }
+
     /// Checks every field.
     ///
     /// # Errors
     /// Names the field, its value and the values that are valid.
     pub fn validate(&self) -> Result<(), Error> {
-        for (field, widths) in [("actor_hidden", &self.actor_hidden), ("critic_hidden", &self.critic_hidden)] {
+        for (field, widths) in [("hidden", &self.hidden[..]), ("critic_hidden", self.critic())] {
             if widths.iter().any(|w| !(1..=65536).contains(w)) || widths.len() > 64 {
                 return Err(Error::config(field, format!("{widths:?}"), "up to 64 widths between 1 and 65536"));
             }

@@ -34,21 +34,32 @@ use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Input of a discriminator, and its loss and reward.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+/// What a discriminator sees, and what its verdict is worth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Form {
-    /// Two consecutive observations; least squares.
+    /// Two observations in a row; least squares.
+    #[default]
     Amp,
     /// One observation; logistic.
     Gail,
+}
+
+impl Form {
+    /// Name of the reward in configurations and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Form::Amp => "amp",
+            Form::Gail => "gail",
+        }
+    }
 }
 
 /// Settings of imitation. The defaults are those of AMP for a character with clips.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Imitation {
-    /// Input, loss and reward.
+    /// What it sees, and what its verdict is worth. In files it is the name of the reward.
+    #[serde(skip)]
     pub form: Form,
     /// Widths of the discriminator's hidden layers.
     pub hidden: Vec<usize>,
@@ -94,16 +105,14 @@ impl Imitation {
     /// # Errors
     /// Names the field, its value and the values that are valid.
     pub fn validate(&self) -> Result<(), Error> {
-        for (field, x) in
-            [("rewards: gradient_penalty", self.gradient_penalty), ("rewards: logit_decay", self.logit_decay)]
-        {
+        for (field, x) in [("gradient_penalty", self.gradient_penalty), ("logit_decay", self.logit_decay)] {
             if !((x as f32).is_finite() && x >= 0.0) {
                 return Err(Error::config(field, x, "a number not below 0"));
             }
         }
         match self.share > 0.0 && self.share <= 1.0 {
             true => Ok(()),
-            false => Err(Error::config("rewards: share", self.share, "a number above 0 and at most 1")),
+            false => Err(Error::config("share", self.share, "a number above 0 and at most 1")),
         }
     }
 
@@ -122,7 +131,11 @@ impl Imitation {
                 let near = nearest(name, names()).map(|near| format!("'{near}', or another of ")).unwrap_or_default();
                 let expected =
                     format!("parts of {}'s observation: {near}{}", spec.id, names().collect::<Vec<_>>().join(", "));
-                return Err(Error::config("rewards: observations", format!("'{name}'"), expected));
+                return Err(Error::config(
+                    format!("rewards.{}.observations", self.form.name()),
+                    format!("'{name}'"),
+                    expected,
+                ));
             };
             sees.extend(group.range.clone());
         }

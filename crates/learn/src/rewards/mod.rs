@@ -8,6 +8,7 @@
 
 pub mod curiosity;
 pub mod discriminator;
+pub mod document;
 mod kernels;
 pub mod rnd;
 
@@ -15,7 +16,7 @@ use crate::error::Error;
 use crate::lanes::noise::{SIGNALS, SplitMix};
 use crate::nets::normalize::Normalizer;
 use curiosity::Curiosity;
-use discriminator::{Discriminator, Form, Imitation};
+use discriminator::{Discriminator, Imitation};
 use marathon_envs::{Demonstrations, Spec};
 use marathon_physics::lanes::Isa;
 use rnd::Rnd;
@@ -23,9 +24,8 @@ use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Kind of a reward.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+/// What is rewarded.
+#[derive(Clone, Debug, PartialEq)]
 pub enum RewardKind {
     /// The task's reward.
     Task,
@@ -40,14 +40,16 @@ pub enum RewardKind {
 }
 
 impl RewardKind {
+    /// All names, in the order in which rewards are learned from.
+    pub const NAMES: [&str; 5] = ["task", "curiosity", "rnd", "gail", "amp"];
+
     /// Name in configurations and reports.
     pub fn name(&self) -> &'static str {
         match self {
             RewardKind::Task => "task",
             RewardKind::Curiosity(_) => "curiosity",
             RewardKind::Rnd(_) => "rnd",
-            RewardKind::Imitation(Imitation { form: Form::Amp, .. }) => "amp",
-            RewardKind::Imitation(Imitation { form: Form::Gail, .. }) => "gail",
+            RewardKind::Imitation(imitation) => imitation.form.name(),
         }
     }
     /// Widths of the hidden layers of its networks and their learning rate, if it has networks.
@@ -92,9 +94,8 @@ impl Default for Novelty {
     }
 }
 
-/// A reward. The defaults are ML-Agents'.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// A reward; the defaults are ML-Agents'.
+#[derive(Clone, Debug, PartialEq)]
 pub struct RewardConfig {
     /// Kind of the reward.
     pub kind: RewardKind,
@@ -110,6 +111,11 @@ impl RewardConfig {
         Self { kind, strength: 1.0, gamma: 0.99 }
     }
 
+    /// A field of this reward.
+    fn field(&self, name: &str) -> String {
+        format!("{}.{name}", self.kind.name())
+    }
+
     /// Checks every field.
     ///
     /// # Errors
@@ -117,18 +123,22 @@ impl RewardConfig {
     pub fn validate(&self) -> Result<(), Error> {
         let positive = |field, x: f64| match (x as f32).is_finite() && x > 0.0 {
             true => Ok(()),
-            false => Err(Error::config(field, x, "a positive number")),
+            false => Err(Error::config(self.field(field), x, "a positive number")),
         };
-        positive("rewards: strength", self.strength)?;
+        positive("strength", self.strength)?;
         if !(0.0..=1.0).contains(&self.gamma) {
-            return Err(Error::config("rewards: gamma", self.gamma, "a number between 0 and 1"));
+            return Err(Error::config(self.field("gamma"), self.gamma, "a number between 0 and 1"));
         }
         let Some((hidden, lr)) = self.kind.networks() else { return Ok(()) };
-        positive("rewards: lr", lr)?;
+        positive("lr", lr)?;
         if hidden.is_empty() || hidden.len() > 64 || hidden.iter().any(|w| !(1..=4096).contains(w)) {
-            return Err(Error::config("rewards: hidden", format!("{hidden:?}"), "1 to 64 widths between 1 and 4096"));
+            return Err(Error::config(
+                self.field("hidden"),
+                format!("{hidden:?}"),
+                "1 to 64 widths between 1 and 4096",
+            ));
         }
-        self.kind.imitation().map_or(Ok(()), Imitation::validate)
+        self.kind.imitation().map_or(Ok(()), Imitation::validate).map_err(|error| error.within(self.kind.name()))
     }
 }
 

@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 const FORMAT: &str = "marathon-checkpoint";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const DESCRIPTION: &str = "checkpoint.json";
 /// Lists of a role beside those of its learner.
 const OBSERVATIONS: [&str; 2] = ["obs_mean", "obs_var"];
@@ -226,8 +226,8 @@ impl Checkpoint {
             let (before, after) = (&old.network, &new.network);
             pairs.extend([
                 ("algorithm", old.algorithm.name().into(), new.algorithm.name().into()),
-                ("actor_hidden", format!("{:?}", before.actor_hidden), format!("{:?}", after.actor_hidden)),
-                ("critic_hidden", format!("{:?}", before.critic_hidden), format!("{:?}", after.critic_hidden)),
+                ("hidden", format!("{:?}", before.hidden), format!("{:?}", after.hidden)),
+                ("critic_hidden", format!("{:?}", before.critic()), format!("{:?}", after.critic())),
                 ("rewards", rewards(&old), rewards(new)),
                 ("activation", before.activation.name().into(), after.activation.name().into()),
             ]);

@@ -2,13 +2,14 @@
 
 use crate::algorithms::a2c::A2c;
 use crate::algorithms::acktr::Acktr;
+use crate::algorithms::ppo::Ppo;
 use crate::algorithms::sac::Sac;
 use crate::algorithms::{Algorithm, Common, Setup, check};
 use crate::error::Error;
 use crate::lanes::BLOCK;
 use crate::nets::NetworkConfig;
 use crate::nets::activation::Activation;
-use crate::rewards::{RewardConfig, RewardKind};
+use crate::rewards::{RewardConfig, RewardKind, document};
 use crate::rollout::statistics::StatisticsConfig;
 use marathon_envs::{Demonstrations, Spec};
 use marathon_physics::lanes::Isa;
@@ -19,9 +20,10 @@ use std::path::Path;
 /// Most steps of a run: as many as double precision can count.
 pub(crate) const MAX_STEPS: u64 = 1 << 53;
 
-/// Settings of training. Every field has a default, so a file names only what it changes.
+/// Settings of training. Every field has a default, so a file names only what it changes. In files, the settings of the
+/// algorithm stand under its name, and those of each reward under its.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(try_from = "Document", into = "Document")]
 pub struct TrainConfig {
     /// Size and length of the run.
     pub run: RunConfig,
@@ -34,13 +36,12 @@ pub struct TrainConfig {
     /// What learns from the rollouts.
     pub algorithm: Algorithm,
     /// What differs for roles of the task, by their names; the others have the settings above.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub roles: BTreeMap<String, RoleConfig>,
 }
 
 /// Settings of a role of its own.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(try_from = "RoleDocument", into = "RoleDocument")]
 pub struct RoleConfig {
     /// Networks of policy and values.
     pub network: NetworkConfig,
@@ -77,6 +78,98 @@ impl Default for TrainConfig {
             algorithm: Algorithm::default(),
             roles: BTreeMap::new(),
         }
+    }
+}
+
+/// A configuration in files.
+#[derive(Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Document {
+    run: RunConfig,
+    network: NetworkConfig,
+    statistics: StatisticsConfig,
+    #[serde(with = "document")]
+    rewards: Vec<RewardConfig>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ppo: Option<Ppo>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    a2c: Option<A2c>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    acktr: Option<Acktr>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sac: Option<Sac>,
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    roles: BTreeMap<String, RoleConfig>,
+}
+
+/// The settings of a role in files.
+#[derive(Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct RoleDocument {
+    network: NetworkConfig,
+    statistics: StatisticsConfig,
+    #[serde(with = "document")]
+    rewards: Vec<RewardConfig>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ppo: Option<Ppo>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    a2c: Option<A2c>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    acktr: Option<Acktr>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sac: Option<Sac>,
+}
+
+impl From<RoleConfig> for RoleDocument {
+    fn from(RoleConfig { network, statistics, rewards, algorithm }: RoleConfig) -> Self {
+        let mut document = Self { network, statistics, rewards, ..Self::default() };
+        match algorithm {
+            Algorithm::Ppo(settings) => document.ppo = Some(settings),
+            Algorithm::A2c(settings) => document.a2c = Some(settings),
+            Algorithm::Acktr(settings) => document.acktr = Some(settings),
+            Algorithm::Sac(settings) => document.sac = Some(settings),
+        }
+        document
+    }
+}
+
+impl TryFrom<RoleDocument> for RoleConfig {
+    type Error = String;
+
+    fn try_from(document: RoleDocument) -> Result<Self, String> {
+        let RoleDocument { network, statistics, mut rewards, ppo, a2c, acktr, sac } = document;
+        let all =
+            [ppo.map(Algorithm::Ppo), a2c.map(Algorithm::A2c), acktr.map(Algorithm::Acktr), sac.map(Algorithm::Sac)];
+        let algorithm = match all.into_iter().flatten().collect::<Vec<_>>()[..] {
+            [] => Algorithm::default(),
+            [algorithm] => algorithm,
+            [a, b, ..] => {
+                return Err(format!("found {} and {}, expected the settings of one algorithm", a.name(), b.name()));
+            }
+        };
+        if rewards.is_empty() {
+            rewards.push(RewardConfig::new(RewardKind::Task));
+        }
+        Ok(Self { network, statistics, rewards, algorithm })
+    }
+}
+
+impl From<TrainConfig> for Document {
+    fn from(mut config: TrainConfig) -> Self {
+        let (run, roles) = (config.run.clone(), std::mem::take(&mut config.roles));
+        let RoleDocument { network, statistics, rewards, ppo, a2c, acktr, sac } = RoleConfig::from(config).into();
+        Self { run, network, statistics, rewards, ppo, a2c, acktr, sac, roles }
+    }
+}
+
+impl TryFrom<Document> for TrainConfig {
+    type Error = String;
+
+    fn try_from(document: Document) -> Result<Self, String> {
+        let Document { run, network, statistics, rewards, ppo, a2c, acktr, sac, roles } = document;
+        let of_role = RoleDocument { network, statistics, rewards, ppo, a2c, acktr, sac };
+        let RoleConfig { network, statistics, rewards, algorithm } = of_role.try_into()?;
+        Ok(Self { run, network, statistics, rewards, algorithm, roles })
     }
 }
 
@@ -237,8 +330,7 @@ impl TrainConfig {
         isa: Isa,
         demonstrations: Option<&'a Demonstrations>,
     ) -> Setup<'a> {
-        let action_clip = self.algorithm.clone().deviations_mut().map_or(1.0, |deviations| deviations.action_clip);
-        Setup { spec, isa, common: self.common(), action_clip, demonstrations }
+        Setup { spec, isa, common: self.common(), action_clip: self.algorithm.action_clip(), demonstrations }
     }
 
     fn common(&self) -> Common<'_> {
@@ -255,46 +347,59 @@ impl TrainConfig {
     /// Checks every field.
     ///
     /// # Errors
-    /// Names the field, its value and the values that are valid.
+    /// Names the field with its sections, its value and the values that are valid.
     pub fn validate(&self) -> Result<(), Error> {
-        self.run.validate()?;
-        self.network.validate()?;
-        self.statistics.validate()?;
+        self.run.validate().map_err(|error| error.within("run"))?;
+        self.network.validate().map_err(|error| error.within("network"))?;
+        self.statistics.validate().map_err(|error| error.within("statistics"))?;
+        let rank = |reward: &RewardConfig| RewardKind::NAMES.iter().position(|name| *name == reward.kind.name());
         for (i, reward) in self.rewards.iter().enumerate() {
             let name = reward.kind.name();
-            if self.rewards[..i].iter().any(|other| other.kind.name() == name) {
-                return Err(Error::config("rewards", format!("{name} twice"), "each kind once"));
+            if let Some(other) = self.rewards[..i].iter().find(|other| rank(other) >= rank(reward)) {
+                let found = format!("{name} after {}", other.kind.name());
+                let expected = format!("each kind once, in the order {}", RewardKind::NAMES.join(", "));
+                return Err(Error::config("rewards", found, expected));
             }
-            reward.validate()?;
+            reward.validate().map_err(|error| error.within("rewards"))?;
         }
         let first = self.rewards.first().map(|reward| &reward.kind);
         if first != Some(&RewardKind::Task) {
             let found = first.map_or("nothing", RewardKind::name);
             return Err(Error::config("rewards", found, "the task's own in the first place"));
         }
-        self.algorithm.validate(&self.common())?;
-        self.roles.keys().try_for_each(|name| match self.of_role(name).validate() {
-            Err(Error::Config { field, found, expected }) => {
-                let why = format!("is {found}, expected {expected}");
-                Err(Error::Settings { place: format!("roles.{name}.{field}"), why })
-            }
-            other => other,
-        })
+        self.algorithm.validate(&self.common()).map_err(|error| self.of_algorithm(error))?;
+        self.roles
+            .keys()
+            .try_for_each(|name| self.of_role(name).validate().map_err(|error| error.within(&format!("roles.{name}"))))
     }
 
-    /// The same for a configuration in a file, under `key`.
+    /// An error of the algorithm, which demands something of other sections, too.
+    fn of_algorithm(&self, error: Error) -> Error {
+        let other =
+            |field: &str| ["run.", "network.", "statistics.", "rewards"].iter().any(|start| field.starts_with(start));
+        match &error {
+            Error::Config { field, .. } if other(field) => error,
+            _ => error.within(self.algorithm.name()),
+        }
+    }
+
+    /// Refuses settings of a role that a task lacks.
+    ///
+    /// # Errors
+    /// Names the role and those that there are.
+    pub fn check_roles(&self, spec: &Spec) -> Result<(), Error> {
+        let mut unknown = self.roles.keys().filter(|name| !spec.roles.iter().any(|role| role.name == **name));
+        let Some(name) = unknown.next() else { return Ok(()) };
+        let names: Vec<&str> = spec.roles.iter().map(|role| role.name.as_str()).collect();
+        let expected = if names.is_empty() { "none: the task has one role".into() } else { names.join(", ") };
+        Err(Error::config("roles", name, expected))
+    }
+
+    /// The same as [`Self::validate`] for a configuration in a file, under `key`.
     ///
     /// # Errors
     /// Names the file, the setting's place in it, its value and the values that are valid.
     pub fn validate_in(&self, path: &Path, key: &str) -> Result<(), Error> {
-        self.validate().map_err(|error| {
-            let Error::Config { field, .. } = &error else { return error };
-            let document = serde_json::to_value(self).unwrap_or_default();
-            let algorithm = format!("algorithm/{}", self.algorithm.name());
-            let sections = ["run", "network", "statistics", &algorithm];
-            let has = |section: &&&str| document.pointer(&format!("/{section}/{field}")).is_some();
-            let section = sections.iter().find(has).map_or(String::new(), |s| format!(".{}", s.replace('/', ".")));
-            error.in_file(path, &format!("{key}{section}"))
-        })
+        self.validate().map_err(|error| error.in_file(path, key))
     }
 }

@@ -25,10 +25,10 @@ pub fn initialized(
     let mut trainer = Trainer::new(factory, isa, &config.clone().with(|config| config.run.threads = 1))?;
     let role = &trainer.shared.roles[0];
     let meta = policy.meta();
-    let Some(deviations) = role.config.algorithm.clone().deviations_mut().copied() else {
+    if role.config.algorithm.clone().action_std_mut().is_none() {
         let expected = "ppo, a2c or acktr, whose policies start from others";
         return Err(Error::config("algorithm", role.config.algorithm.name(), expected));
-    };
+    }
     let (obs, act) = (role.spec.obs, role.spec.act);
     for (what, found, expected) in [
         ("action length", meta.act.to_string(), act.to_string()),
@@ -39,13 +39,13 @@ pub fn initialized(
         }
     }
     let network = &role.config.network;
-    let net = Mlp::new(&[&[obs], &network.actor_hidden[..], &[act]].concat(), network.activation);
+    let net = Mlp::new(&[&[obs], &network.hidden[..], &[act]].concat(), network.activation);
     let learner = &mut trainer.replica.roles[0];
     // the policy network's parameters are the first ones
     let params = &mut learner.learner.params_mut()[..net.len()];
     graft(&net, params, policy.net(), policy.params(), sees)?;
     // actions drawn are divided by their bound
-    let bound = deviations.action_clip as f32;
+    let bound = role.config.algorithm.action_clip() as f32;
     if bound != 1.0 {
         let (weights, biases) = net.layers().last().expect("a network has layers");
         params[weights.start..biases.end].iter_mut().for_each(|x| *x *= bound);

@@ -43,8 +43,8 @@ fn less(config: &TrainConfig) -> String {
          (now {})",
         config.run.agents,
         config.run.horizon,
-        config.network.actor_hidden,
-        config.network.critic_hidden,
+        config.network.hidden,
+        config.network.critic(),
         config.run.worker_count()
     )
 }

@@ -19,7 +19,6 @@ pub mod checkpoint;
 mod clock;
 pub mod config;
 pub mod evaluate;
-mod flat;
 pub mod initialize;
 pub mod memory;
 pub mod observer;

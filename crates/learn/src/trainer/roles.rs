@@ -33,11 +33,7 @@ impl RoleParts {
     /// If the configuration speaks of another role, or does not suit a role's way of deciding.
     pub fn all(config: &TrainConfig, spec: &Spec) -> Result<Vec<Self>, Error> {
         let roles = spec.deciders();
-        if let Some(name) = config.roles.keys().find(|name| !spec.roles.iter().any(|role| role.name == **name)) {
-            let names: Vec<&str> = spec.roles.iter().map(|role| role.name.as_str()).collect();
-            let expected = if names.is_empty() { "none: the task has one role".into() } else { names.join(", ") };
-            return Err(Error::config("roles", name, expected));
-        }
+        config.check_roles(spec)?;
         let parts = |(i, role): (usize, Role)| {
             let config = config.of_role(&role.name).with(|own| own.run.seed = seed_of_role(config.run.seed, i));
             let suits = matches!(config.algorithm, Algorithm::Ppo(_) | Algorithm::A2c(_)) && config.rewards.len() == 1;
@@ -94,7 +90,7 @@ impl RoleParts {
 
     fn meta(&self) -> PolicyMeta {
         let network = &self.config.network;
-        let mut meta = PolicyMeta::of(&self.spec, network.actor_hidden.clone(), network.activation);
+        let mut meta = PolicyMeta::of(&self.spec, network.hidden.clone(), network.activation);
         meta.observation_clip = self.config.statistics.observation_clip as f32;
         meta
     }

@@ -190,8 +190,8 @@ pub fn small_config() -> TrainConfig {
         ppo(c).minibatches = 3;
         ppo(c).epochs = 2;
         c.run.total_steps = 4 * 80 * 24;
-        c.network.actor_hidden = vec![13, 8];
-        c.network.critic_hidden = vec![16];
+        c.network.hidden = vec![13, 8];
+        c.network.critic_hidden = Some(vec![16]);
         c.run.threads = 1;
     })
 }
@@ -213,7 +213,7 @@ pub fn small_of(algorithm: &str) -> TrainConfig {
         c.run.horizon = 6;
         c.run.rollouts = 4;
         c.run.total_steps = small.run.total_steps;
-        c.network.actor_hidden = small.network.actor_hidden;
+        c.network.hidden = small.network.hidden;
         c.network.critic_hidden = small.network.critic_hidden;
         c.run.threads = 1;
     })
@@ -231,8 +231,8 @@ pub fn learning_config() -> TrainConfig {
         c.run.horizon = 32;
         ppo(c).minibatches = 4;
         c.run.total_steps = 400_000;
-        c.network.actor_hidden = vec![32, 32];
-        c.network.critic_hidden = vec![32, 32];
+        c.network.hidden = vec![32, 32];
+        c.network.critic_hidden = Some(vec![32, 32]);
         c.run.threads = 1;
     })
 }

@@ -18,7 +18,7 @@ mod networks;
 
 use super::loss::LossSums;
 use super::parameters::Places;
-use super::schedule::{Progress, Schedule};
+use super::schedule::{LrSchedule, Progress};
 use super::{Common, Description, Learner, Needs, Now, Saved, Setup, Workers, check, load_adam, save_adam};
 use crate::error::Error;
 use crate::lanes::BLOCK;
@@ -48,8 +48,8 @@ pub struct Sac {
     /// Learning rate of the value networks.
     pub value_lr: f64,
     /// Schedule of both learning rates.
-    pub schedule: Schedule,
-    /// Constant that Adam adds to the root of the second moment.
+    pub lr_schedule: LrSchedule,
+    /// Added to the root of Adam's second moment.
     pub adam_epsilon: f64,
     /// Agent-steps in the replay, rounded down to whole decisions of all agents.
     pub replay: usize,
@@ -72,7 +72,7 @@ impl Default for Sac {
         Self {
             lr: 1e-3,
             value_lr: 1e-3,
-            schedule: Schedule::Constant,
+            lr_schedule: LrSchedule::Constant,
             adam_epsilon: 1e-5,
             replay: 1_000_000,
             warmup: 10_000,
@@ -93,7 +93,7 @@ impl Sac {
     pub fn validate(&self, common: &Common<'_>) -> Result<(), Error> {
         if common.agents < BLOCK {
             let nearest = format!("a multiple of {BLOCK}, such as {BLOCK} with sac");
-            return Err(Error::config("agents", common.agents, nearest));
+            return Err(Error::config("run.agents", common.agents, nearest));
         }
         if self.batch == 0 || !self.batch.is_multiple_of(BLOCK) || self.batch > 1 << 20 {
             return Err(Error::config("batch", self.batch, format!("a multiple of {BLOCK} up to {}", 1 << 20)));
@@ -119,14 +119,14 @@ impl Sac {
         }
         if common.statistics.scale_rewards {
             let why = "false with sac: rewards of another scale would stay in the replay";
-            return Err(Error::config("scale_rewards", true, why));
+            return Err(Error::config("statistics.scale_rewards", true, why));
         }
         if common.statistics.follow_statistics {
-            let why = "false with sac, which normalizes its replay at every draw";
-            return Err(Error::config("follow_statistics", true, why));
+            let why = "false with sac, whose replay is normalized anew whenever it is drawn from";
+            return Err(Error::config("statistics.follow_statistics", true, why));
         }
         check::task_alone(common, "sac")?;
-        super::actor_critic::refuse_adaptive(self.schedule, "sac")
+        super::actor_critic::refuse_adaptive(self.lr_schedule, "sac")
     }
 
     /// Memory that a run needs.
@@ -205,7 +205,7 @@ impl SacLearner {
             return;
         }
         let normalizer = statistics.normalizer();
-        self.lr = settings.lr * progress.rate(settings.schedule);
+        self.lr = settings.lr * progress.rate(settings.lr_schedule);
         for u in 0..settings.updates {
             let draw = progress.iteration * settings.updates as u64 + u as u64;
             let mut random = SplitMix::new(seed, draw | SAMPLES);
@@ -249,7 +249,7 @@ impl SacLearner {
             return;
         }
         adam.advance();
-        let value_lr = settings.value_lr * progress.rate(settings.schedule);
+        let value_lr = settings.value_lr * progress.rate(settings.lr_schedule);
         let rates = [*lr, value_lr, value_lr, *lr];
         workers.pieces(&mut |net, range, gradient| {
             adam.update(nets.isa, &mut nets.params, range, gradient, 1.0 / sums.samples, rates[net]);

@@ -34,8 +34,8 @@ pub(super) struct Layout {
 impl Layout {
     pub fn new(setup: &Setup<'_>) -> Self {
         let (obs, act, network) = (setup.spec.obs, setup.spec.act, setup.common.network);
-        let actor = Mlp::new(&[&[obs], &network.actor_hidden[..], &[2 * act]].concat(), network.activation);
-        let critic = Mlp::new(&[&[obs + act], &network.critic_hidden[..], &[1]].concat(), network.activation);
+        let actor = Mlp::new(&[&[obs], &network.hidden[..], &[2 * act]].concat(), network.activation);
+        let critic = Mlp::new(&[&[obs + act], network.critic(), &[1]].concat(), network.activation);
         let mut places = Places::default();
         // space for the deviations of other algorithms: saved files have the networks at these places
         places.add(actor.len() + act);

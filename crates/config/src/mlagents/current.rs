@@ -1,10 +1,10 @@
 //! The present format of ML-Agents: `behaviors:` with nested sections.
 
 use super::behavior::{Behavior, Format, Notes, select};
-use super::document::Map;
-use super::error::ConfigError;
-use super::features::{NETWORK, Without, off, refuse, reward_signals, threaded, trainer, visual};
-use super::section::{Range, Section};
+use super::features::{NETWORK, off, refuse, reward_signals, threaded, trainer, visual};
+use crate::document::Map;
+use crate::error::ConfigError;
+use crate::section::{Range, Section};
 use marathon_learn::Algorithm;
 use std::path::Path;
 
@@ -19,7 +19,7 @@ pub const TOP: [&str; 8] = [
     "torch_settings",
     "debug",
 ];
-const BEHAVIOR: [&str; 16] = [
+const BEHAVIOR: [&str; 15] = [
     "trainer_type",
     "hyperparameters",
     "network_settings",
@@ -35,7 +35,6 @@ const BEHAVIOR: [&str; 16] = [
     "self_play",
     "behavioral_cloning",
     "framework",
-    "marathon",
 ];
 const HYPERPARAMETERS: [&str; 11] = [
     "batch_size",
@@ -103,8 +102,6 @@ pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a
     top.only(&BEHAVIOR)?;
     let hyperparameters = top.section("hyperparameters")?;
     let network = top.section("network_settings")?;
-    let marathon = top.section("marathon")?;
-    let without = Without::read(&marathon)?;
 
     let base = trainer(top.get("trainer_type"))?;
     match &base.algorithm {
@@ -121,9 +118,7 @@ pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a
     off(&hyperparameters, "shared_critic", "one network for policy and value")?;
 
     network.only(&NETWORK)?;
-    if let Some(entry) = network.set("memory") {
-        without.feature("memory", &entry, "null", &mut notes)?;
-    }
+    refuse(network.set("memory"), "recurrent memory", "null")?;
     visual(&network, &mut notes)?;
     if let Some(entry) = network.set("goal_conditioning_type") {
         entry.word(&["hyper", "none"])?;
@@ -137,12 +132,10 @@ pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a
         notes.ignored(&entry, "it is for agents in groups");
     }
 
-    let (extrinsic, signals) = reward_signals(&top, &without, &mut notes)?;
+    let (extrinsic, signals) = reward_signals(&top, &mut notes)?;
     refuse(top.set("self_play"), "self-play", "null")?;
     refuse(top.set("init_path"), "starting from another run", "null")?;
-    if let Some(entry) = top.set("behavioral_cloning") {
-        without.feature("behavioral_cloning", &entry, "null", &mut notes)?;
-    }
+    refuse(top.set("behavioral_cloning"), "behavioral cloning", "null")?;
     threaded(&top, &mut notes)?;
     if let Some(entry) = top.set("framework") {
         notes.ignored(&entry, "there is one trainer");
@@ -156,7 +149,6 @@ pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a
         network,
         extrinsic,
         signals,
-        marathon,
         steps_per_agent: false,
         seed,
         notes,
@@ -176,7 +168,7 @@ fn around(root: &Section<'_>, notes: &mut Notes) -> Result<Option<u64>, ConfigEr
     env.only(&ENV)?;
     for key in ["num_envs", "num_areas"] {
         if let Some(entry) = env.set(key) {
-            notes.ignored(&entry, "the number of agents is 'agents' in the behavior's 'marathon:' section");
+            notes.ignored(&entry, "the buffer and the horizon say how many agents there are, unless the run does");
         }
     }
     for key in ["env_path", "env_args"] {

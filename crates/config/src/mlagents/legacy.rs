@@ -2,17 +2,15 @@
 //! below all of them.
 
 use super::behavior::{Behavior, Format, Notes, select};
-use super::current;
-use super::document::Map;
-use super::error::{ConfigError, Place};
-use super::features::{Without, refuse, reward_signals, threaded, trainer, visual};
-use super::section::{Range, Section};
+use super::features::{off, refuse, reward_signals, threaded, trainer, visual};
+use crate::document::Map;
+use crate::error::ConfigError;
+use crate::section::{Range, Section};
 use marathon_learn::{Algorithm, Novelty, RewardConfig, RewardKind};
-use marathon_physics::hint::nearest;
 use std::path::Path;
 
 /// Keys of a section.
-const BRAIN: [&str; 33] = [
+pub const BRAIN: [&str; 32] = [
     "trainer",
     "batch_size",
     "buffer_size",
@@ -45,7 +43,6 @@ const BRAIN: [&str; 33] = [
     "self_play",
     "behavioral_cloning",
     "pretraining",
-    "marathon",
 ];
 
 /// Finds an agent's settings and refuses what is misspelled or not supported.
@@ -55,11 +52,6 @@ const BRAIN: [&str; 33] = [
 pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a>, ConfigError> {
     let mut notes = Notes::default();
     let root = Section::root(path, map);
-    // a file in the present format whose only section is misspelled
-    if let Some(field) = map.entries.iter().find(|field| nearest(&field.key, current::TOP).is_some()) {
-        let place = Place { file: path.into(), line: field.line, key: field.key.clone() };
-        return Err(ConfigError::unknown(place, &field.key, &current::TOP));
-    }
     let top = select(path, agent, &root, root.section("default")?, "default", &mut notes)?;
     // the trainer first: others have other keys
     let base = trainer(top.get("trainer"))?;
@@ -67,25 +59,16 @@ pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a
         refuse(top.get("trainer"), "SAC in a file of this format", "the present format, with 'behaviors:'")?;
     }
     top.only(&BRAIN)?;
-    let marathon = top.section("marathon")?;
-    let without = Without::read(&marathon)?;
-
-    if let Some(entry) = top.set("use_recurrent")
-        && entry.flag()?
-    {
-        without.feature("memory", &entry, "false", &mut notes)?;
-    }
+    off(&top, "use_recurrent", "recurrent memory")?;
     for key in ["behavioral_cloning", "pretraining"] {
-        if let Some(entry) = top.set(key) {
-            without.feature("behavioral_cloning", &entry, "null", &mut notes)?;
-        }
+        refuse(top.set(key), "behavioral cloning", "null")?;
     }
     visual(&top, &mut notes)?;
     threaded(&top, &mut notes)?;
     refuse(top.set("self_play"), "self-play", "null")?;
     refuse(top.set("init_path"), "starting from another run", "null")?;
-    let (extrinsic, mut signals) = reward_signals(&top, &without, &mut notes)?;
-    signals.extend(curiosity(&top, &without, &mut notes)?);
+    let (extrinsic, mut signals) = reward_signals(&top, &mut notes)?;
+    signals.extend(curiosity(&top, &mut notes)?);
     Ok(Behavior {
         format: Format::Legacy,
         base,
@@ -96,7 +79,6 @@ pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a
         steps_per_agent: extrinsic.is_empty(),
         extrinsic: extrinsic.above(top.clone()),
         signals,
-        marathon,
         top,
         seed: None,
         notes,
@@ -104,11 +86,11 @@ pub fn read<'a>(path: &'a Path, map: &'a Map, agent: &str) -> Result<Behavior<'a
 }
 
 /// Curiosity as it was asked for before version 0.9.
-fn curiosity(top: &Section<'_>, without: &Without<'_>, notes: &mut Notes) -> Result<Option<RewardConfig>, ConfigError> {
+fn curiosity(top: &Section<'_>, notes: &mut Notes) -> Result<Option<RewardConfig>, ConfigError> {
     let strength = top.number("curiosity_strength", Range::NotNegative, 0.01)?;
     let size = top.count("curiosity_enc_size", 1..=4096, 128)? as usize;
     let Some(entry) = top.set("use_curiosity") else { return Ok(None) };
-    if !entry.flag()? || strength == 0.0 || without.leaves_out("curiosity", &entry, notes) {
+    if !entry.flag()? || strength == 0.0 {
         return Ok(None);
     }
     notes.about(&entry, "has a value stream of its own; versions before 0.9 added it to the task's reward");

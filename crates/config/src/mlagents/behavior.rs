@@ -1,8 +1,8 @@
 //! The part of a file that speaks of one agent, the same for both formats.
 
-use super::error::{ConfigError, shown};
-use super::names;
-use super::section::{Entry, Section};
+use crate::error::{ConfigError, shown};
+use crate::names;
+use crate::section::{Entry, Section};
 use marathon_learn::{RewardConfig, TrainConfig};
 use marathon_physics::hint::nearest;
 use std::path::Path;
@@ -27,9 +27,8 @@ pub struct Behavior<'a> {
     pub network: Section<'a>,
     /// Of the reward that the task gives.
     pub extrinsic: Section<'a>,
-    /// Rewards for novelty.
+    /// The other rewards.
     pub signals: Vec<RewardConfig>,
-    pub marathon: Section<'a>,
     /// Whether steps are counted for each agent by itself, not for all together.
     pub steps_per_agent: bool,
     /// Seed that the file gives for the whole run.
@@ -45,7 +44,8 @@ impl Notes {
     /// Says something about a key.
     pub fn about(&mut self, entry: &Entry<'_>, text: &str) {
         let place = &entry.place;
-        self.0.push(format!("line {}: {} {text}", place.line, shown(&place.key)));
+        let line = if place.line > 0 { format!("line {}: ", place.line) } else { String::new() };
+        self.0.push(format!("{line}{} {text}", shown(&place.key)));
     }
     /// A key that does nothing here.
     pub fn ignored(&mut self, entry: &Entry<'_>, why: &str) {

@@ -2,11 +2,11 @@
 //! harmless.
 
 use super::behavior::Notes;
-use super::error::{ConfigError, Place};
-use super::section::{Entry, Range, Section};
+use crate::error::{ConfigError, Place};
+use crate::section::{Entry, Range, Section};
 use marathon_learn::{
-    Activation, Algorithm, Deviations, Form, Imitation, Init, Moving, NetworkConfig, Novelty, Ppo, Ratio, RewardConfig,
-    RewardKind, Sac, Schedule, StatisticsConfig, TrainConfig,
+    ActionStd, Activation, Algorithm, Form, Imitation, Init, LrSchedule, NetworkConfig, Novelty, Ppo, Ratio,
+    RewardConfig, RewardKind, Sac, Schedule, StatisticsConfig, TrainConfig,
 };
 
 /// Keys of a network's section.
@@ -20,64 +20,6 @@ pub const NETWORK: [&str; 8] = [
     "deterministic",
     "max_num_agents",
 ];
-
-/// Features that a file asks for and lets go again, under `marathon: without:`.
-pub struct Without<'a> {
-    names: Vec<&'static str>,
-    file_has_list: Option<Entry<'a>>,
-}
-
-/// What may be let go: the name in the list, and in messages.
-const FEATURES: [(&str, &str); 5] = [
-    ("curiosity", "curiosity"),
-    ("rnd", "random network distillation"),
-    ("gail", "imitation by GAIL"),
-    ("behavioral_cloning", "behavioral cloning"),
-    ("memory", "recurrent memory"),
-];
-
-impl<'a> Without<'a> {
-    /// Reads the list.
-    ///
-    /// # Errors
-    /// If it is no list of known features.
-    pub fn read(marathon: &Section<'a>) -> Result<Self, ConfigError> {
-        let Some(entry) = marathon.set("without") else {
-            return Ok(Without { names: Vec::new(), file_has_list: None });
-        };
-        let all = FEATURES.map(|(name, _)| name);
-        let items = entry.items(&format!("a list of some of {}", all.join(", ")))?;
-        let names: Result<Vec<_>, _> = items.iter().map(|item| item.word(&all).map(|i| all[i])).collect();
-        Ok(Without { names: names?, file_has_list: Some(entry) })
-    }
-
-    /// Whether the file says that a feature that an entry asks for may be left out; then it is noted.
-    pub fn leaves_out(&self, name: &str, asks: &Entry<'_>, notes: &mut Notes) -> bool {
-        let Some((_, feature)) = FEATURES.into_iter().find(|(n, _)| *n == name && self.names.contains(n)) else {
-            return false;
-        };
-        let line = self.file_has_list.as_ref().map_or(0, |entry| entry.place.line);
-        notes.about(asks, &format!("asks for {feature}, which is left out as line {line} allows"));
-        true
-    }
-
-    /// Refuses a feature that an entry asks for, or notes that it is left out.
-    ///
-    /// # Errors
-    /// Unless the file itself says that the feature may be left out.
-    pub fn feature(&self, name: &str, asks: &Entry<'_>, off: &str, notes: &mut Notes) -> Result<(), ConfigError> {
-        if self.leaves_out(name, asks, notes) {
-            return Ok(());
-        }
-        let (name, feature) = FEATURES.into_iter().find(|(n, _)| *n == name).expect("a feature of the table");
-        Err(ConfigError::Unsupported {
-            place: asks.place.clone(),
-            feature,
-            found: asks.node.describe(),
-            expected: format!("{off}, or 'marathon: {{without: [{name}]}}' beside it to train without"),
-        })
-    }
-}
 
 /// The settings that a trainer starts from: those of ML-Agents for PPO, which is meant where none is named, and those of
 /// OpenAI Baselines for the two that ML-Agents has not.
@@ -115,16 +57,12 @@ fn ml_agents() -> TrainConfig {
     let ppo = Ppo {
         epochs: 3,
         lr: 3e-4,
-        schedule: Schedule::Linear,
-        entropy_coef: Moving::still(5e-3),
+        lr_schedule: LrSchedule::Linear,
+        entropy_coef: Schedule::constant(5e-3),
         ratio: Ratio::PerAction,
-        deviations: Deviations {
-            action_clip: 3.0,
-            init_log_std: 0.0,
-            // neither the deviation nor the gradient is bounded: far out
-            min_std: Moving::still(1e-3),
-            max_std: 1e3,
-        },
+        action_clip: 3.0,
+        // neither the deviation nor the gradient is bounded: far out
+        action_std: ActionStd { init_log: 0.0, min: Schedule::constant(1e-3), max: 1e3 },
         max_grad_norm: 1e9,
         // PyTorch's
         adam_epsilon: 1e-8,
@@ -151,8 +89,8 @@ fn ml_agents() -> TrainConfig {
 /// ML-Agents' networks.
 fn network() -> NetworkConfig {
     NetworkConfig {
-        actor_hidden: vec![128; 2],
-        critic_hidden: vec![128; 2],
+        hidden: vec![128; 2],
+        critic_hidden: None,
         activation: Activation::Swish,
         initialization: Init::MlAgents,
     }
@@ -214,7 +152,6 @@ pub fn threaded(top: &Section<'_>, notes: &mut Notes) -> Result<(), ConfigError>
 /// If there are others, or the task's own is missing or has no strength.
 pub fn reward_signals<'a>(
     top: &Section<'a>,
-    without: &Without<'_>,
     notes: &mut Notes,
 ) -> Result<(Section<'a>, Vec<RewardConfig>), ConfigError> {
     let signals = top.section("reward_signals")?;
@@ -222,14 +159,15 @@ pub fn reward_signals<'a>(
     let Some(whole) = top.set("reward_signals") else { return Ok((signals, others)) };
     signals.only(&["extrinsic", "curiosity", "rnd", "gail", "amp"])?;
     for name in ["curiosity", "rnd", "gail", "amp"] {
-        let Some(entry) = signals.set(name) else { continue };
+        if signals.set(name).is_none() {
+            continue;
+        }
         // a reward of strength zero is switched off
         let section = signals.section(name)?;
         if section.number("strength", Range::NotNegative, 1.0)? == 0.0 {
             continue;
         }
         match name {
-            _ if without.leaves_out(name, &entry, notes) => {}
             "curiosity" => others.push(novelty_of(RewardKind::Curiosity, &section, notes)?),
             "rnd" => others.push(novelty_of(RewardKind::Rnd, &section, notes)?),
             "gail" => others.push(imitation_of(Form::Gail, &section, notes)?),

@@ -1,8 +1,8 @@
 //! What ML-Agents' own keys say, and its defaults for what they leave out.
 
 use super::behavior::{Behavior, Format};
-use super::error::ConfigError;
-use super::section::{Range, Section};
+use crate::error::ConfigError;
+use crate::section::{Range, Section};
 use marathon_learn::Algorithm;
 
 /// Most of anything that is counted in a file.
@@ -79,9 +79,9 @@ impl Settings {
         };
         // those that an algorithm has no use for may be any
         let (lr, beta, epsilon, lambd, epochs) = match &base.algorithm {
-            Algorithm::Ppo(ppo) => (ppo.lr, ppo.entropy_coef.first, ppo.clip.first, ppo.gae_lambda, ppo.epochs),
-            Algorithm::A2c(a2c) => (a2c.lr, a2c.entropy_coef.first, 0.2, a2c.gae_lambda, 1),
-            Algorithm::Acktr(acktr) => (acktr.lr, acktr.entropy_coef.first, 0.2, acktr.gae_lambda, 1),
+            Algorithm::Ppo(ppo) => (ppo.lr, ppo.entropy_coef.from, ppo.clip.from, ppo.gae_lambda, ppo.epochs),
+            Algorithm::A2c(a2c) => (a2c.lr, a2c.entropy_coef.from, 0.2, a2c.gae_lambda, 1),
+            Algorithm::Acktr(acktr) => (acktr.lr, acktr.entropy_coef.from, 0.2, acktr.gae_lambda, 1),
             Algorithm::Sac(sac) => (sac.lr, 0.0, 0.2, 0.95, 1),
         };
         Ok(Settings {
@@ -99,7 +99,7 @@ impl Settings {
             hidden_units: network.count(
                 "hidden_units",
                 1..=65_536,
-                base.network.actor_hidden.first().map_or(128, |w| *w as u64),
+                base.network.hidden.first().map_or(128, |w| *w as u64),
             )?,
             num_layers: network.count("num_layers", 1..=64, 2)?,
             gamma: extrinsic.number("gamma", Range::Fraction, base.task_reward().gamma)?,
