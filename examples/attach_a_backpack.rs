@@ -2,8 +2,8 @@
 //!
 //! A [`ModelSpec`] is a parsed MJCF file, the counterpart of MuJoCo's `mjSpec`. Parts are added, changed, replaced and
 //! removed by name, then [`ModelSpec::compile`] makes the [`Model`]. Keyframes keep their meaning: the start pose of the humanoid
-//! gets a number for the strap of the backpack. [`ModelSpec::to_xml`] writes the edited model as MJCF, which
-//! `marathon_envs::ModelSource::from` makes the model of an agent.
+//! gets a number for the strap of the backpack. [`ModelSpec::to_xml`] writes the edited model as MJCF. An agent takes it as
+//! `marathon_envs::ModelSource::from(spec)`.
 //!
 //! The example lets the humanoid fall with and without ten kilograms on its back. Its motors are off, so the weight decides
 //! which way it falls.

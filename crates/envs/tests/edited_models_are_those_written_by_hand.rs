@@ -1,5 +1,5 @@
-//! Tasks that edit their figure's model get the bits of a model written by hand: a course in place of the floor, and actuators
-//! of roles without a body behind the figure's own.
+//! Tasks that edit the model of their figure get the bits of a model written by hand. Edits are a course in place of the floor,
+//! actuators for roles without a body, and servos in place of motors.
 
 use marathon_envs::{Options, agent};
 use marathon_physics::Model;

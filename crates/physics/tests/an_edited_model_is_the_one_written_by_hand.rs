@@ -1,6 +1,6 @@
 //! A model that is edited and then compiled equals, bit for bit, the model whose file says the same.
 //!
-//! Removed elements take along what refers to them, keyframes keep their meaning, a wrong name is an error with the nearest
+//! References to removed elements go with them, and keyframes keep their meaning. A wrong name is an error with the nearest
 //! one, and an edit that fails changes nothing.
 
 mod common;

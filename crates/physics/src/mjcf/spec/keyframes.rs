@@ -20,7 +20,7 @@ const LISTS: [&str; 6] = ["qpos", "qvel", "act", "ctrl", "mpos", "mquat"];
 #[derive(Clone, Debug, Default)]
 pub(super) struct Share([(usize, Vec<f64>); LISTS.len()]);
 
-/// What one element adds to each list.
+/// The numbers that one element adds to each list.
 type Values = [Vec<f64>; LISTS.len()];
 
 impl Share {

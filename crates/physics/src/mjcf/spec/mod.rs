@@ -249,8 +249,8 @@ impl ModelSpec {
         self.add_part(part, |spec, _| Ok([&spec.path(Kind::Body, body)?[..], &[0]].concat()))
     }
 
-    /// Puts a part in the place of one of its kind, which goes with all that it holds. The new one takes over its name unless
-    /// it has one. What refers to names that are gone is removed, and returned as by [`ModelSpec::remove`].
+    /// Puts a part in the place of one of its kind, and removes that one with all that it holds. The new part takes over the name
+    /// unless it has its own. References to names that are gone are removed and returned as by [`ModelSpec::remove`].
     ///
     /// # Errors
     /// If there is none of this name, the part's own name is taken, or it has an attribute that MJCF does not have.
@@ -271,9 +271,9 @@ impl ModelSpec {
         self.remove_references(gone)
     }
 
-    /// Removes an element with all that it holds, and what refers to any of it: actuators, sensors, tendons, constraints,
-    /// contact pairs and excludes, and cameras, lights or geoms that cannot do without it. Returns the start tags of these
-    /// others, such as `<motor name="shoulder">`.
+    /// Removes an element with all that it holds, and everything that refers to any of it. These can be actuators, sensors,
+    /// tendons, constraints, contact pairs and excludes, cameras, lights and geoms. Returns their start tags, such as
+    /// `<motor name="shoulder">`.
     ///
     /// # Errors
     /// If there is no such element, or it is the world.

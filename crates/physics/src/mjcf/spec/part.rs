@@ -1,4 +1,4 @@
-//! What all parts share: an element in the making.
+//! Base of all parts: an element that is not in a document yet.
 
 use super::super::document::{Attr, Element, Place};
 use super::kind::Kind;
