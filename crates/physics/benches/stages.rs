@@ -7,6 +7,8 @@
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use marathon_physics::lanes::{Isa, Real};
+use marathon_physics::mjcf::MjcfError;
+use marathon_physics::spec::{HField, Kind, ModelSpec};
 use marathon_physics::workload::HOLD;
 use marathon_physics::{Group, Model, Sim, SimOptions, Stage, Work, with_lanes};
 
@@ -50,43 +52,36 @@ impl std::fmt::Display for Scene {
 
 impl Scene {
     fn model(self) -> Model {
+        self.edited().and_then(|spec| spec.compile()).expect("the model is valid")
+    }
+
+    fn edited(self) -> Result<ModelSpec, MjcfError> {
         let text = match self {
-            Scene::Hopper => HOPPER.to_string(),
-            Scene::Humanoid => HUMANOID.to_string(),
-            Scene::MarathonMan => MARATHON_MAN.to_string(),
+            Scene::Hopper => HOPPER,
+            Scene::MarathonMan => MARATHON_MAN,
+            Scene::Humanoid | Scene::SelfCollision | Scene::HeightField => HUMANOID,
+        };
+        let mut spec = ModelSpec::from_xml_str(text, &self.to_string())?;
+        match self {
             Scene::SelfCollision => {
-                replaced(HUMANOID, r#"contype="1" conaffinity="0""#, r#"contype="1" conaffinity="1""#)
+                spec.default_mut("main", "geom")?.set("conaffinity", 1)?;
             }
             Scene::HeightField => {
-                let rough = replaced(
-                    HUMANOID,
-                    r#"<geom name="floor" type="plane" size="0 0 1""#,
-                    r#"<geom name="floor" type="hfield" hfield="hills""#,
-                );
-                replaced(&rough, "</asset>", &format!("{}</asset>", hills()))
+                spec.get_mut(Kind::Geom, "floor")?.unset("size")?.set("type", "hfield")?.set("hfield", "hills")?;
+                spec.add(hills())?;
             }
-        };
-        Model::from_xml_str(&text, &self.to_string()).expect("the model is valid")
+            Scene::Hopper | Scene::Humanoid | Scene::MarathonMan => {}
+        }
+        Ok(spec)
     }
-}
-
-/// `text` with a part replaced that must be there.
-fn replaced(text: &str, part: &str, by: &str) -> String {
-    assert!(text.contains(part), "the model has changed: no {part}");
-    text.replace(part, by)
 }
 
 /// Hills of 10 cm on a grid of 25 cm, 24 m wide.
-fn hills() -> String {
+fn hills() -> HField {
     let n = 97;
-    let mut heights = String::new();
-    for row in 0..n {
-        for column in 0..n {
-            let bump = |i: usize, period: usize| (i % period).min(period - i % period) as f64 / (period / 2) as f64;
-            heights += &format!("{:.3} ", 0.5 * (bump(row, 6) + bump(column, 8)));
-        }
-    }
-    format!(r#"<hfield name="hills" nrow="{n}" ncol="{n}" size="12 12 0.1 0.2" elevation="{heights}"/>"#)
+    let bump = |i: usize, period: usize| (i % period).min(period - i % period) as f64 / (period / 2) as f64;
+    let heights: Vec<f64> = (0..n * n).map(|i| (500.0 * (bump(i / n, 6) + bump(i % n, 8))).round() / 1000.0).collect();
+    HField::new("hills", n, n, [12.0, 12.0, 0.1, 0.2]).elevation(&heights)
 }
 
 /// States of a group on their way, each with what the step computed for it.
