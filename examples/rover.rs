@@ -5,7 +5,7 @@
 //! with [`Senses::command`].
 //!
 //! Others tell it what to do in its schedule's place: a program (`steer_an_agent.rs`), a trainer in Python (`own_player.rs`),
-//! a gamepad (`crates/game/examples/steer.rs`).
+//! a gamepad (`crates/bevy_marathon/examples/steer.rs`).
 
 use marathon_envs::{Agent, CommandRange, EpisodeRng, Facts, Motors, Obs, Part, Senses, Terms, Tolerance, names};
 use marathon_physics::lanes::Real;

@@ -3,5 +3,5 @@
 # shellcheck shell=bash disable=SC2034
 packages=(--workspace)
 if [ -z "${MARATHON_TEST_GAME:-}" ]; then
-  packages+=(--exclude marathon-game --exclude avian_props)
+  packages+=(--exclude marathon-game --exclude bevy_marathon --exclude avian_props)
 fi

@@ -1,9 +1,8 @@
 //! How long a device's word takes to become a command, beside how long the character takes to obey: with nothing but a dead zone
 //! and a curve, a frame and a decision; smoothing adds 2.3 times its time to what is 90 % of the word. The table in `docs/game.md`
 //! is what this test prints.
-#![cfg(feature = "render")]
 
-#[path = "common/devices.rs"]
+#[path = "../../bevy_marathon/tests/common/devices.rs"]
 mod devices;
 #[path = "common/windowless.rs"]
 mod windowless;
@@ -11,8 +10,8 @@ mod windowless;
 use bevy::input::ButtonState;
 use bevy::input::gamepad::GamepadAxis;
 use bevy::prelude::*;
+use bevy_marathon::prelude::*;
 use devices::{key, pad, push};
-use marathon_game::prelude::*;
 use std::time::Duration;
 use windowless::frames;
 

@@ -1,6 +1,5 @@
 //! Assault courses in the game: a policy runs, a player leads a runner, or builds the ground ahead of one by mouse and keys. What
 //! has ended enters the table of the longest runs, and its replay is the run to the bit, ground included.
-#![cfg(feature = "render")]
 
 #[path = "common/windowless.rs"]
 mod windowless;
@@ -10,12 +9,12 @@ use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::input::mouse::{MouseButtonInput, MouseScrollUnit, MouseWheel};
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
+use bevy_marathon::prelude::*;
 use clap::Parser;
 use marathon_envs::{Autoreset, VecEnvOptions};
 use marathon_game::app::{
     Action, Actor, Args, Bindings, GamePlugin, List, Mode, Place, Playback, Recording, Run, Runs, Scenario, Step, Table,
 };
-use marathon_game::prelude::*;
 use std::error::Error;
 use std::path::Path;
 use std::sync::Arc;

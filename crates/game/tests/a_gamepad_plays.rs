@@ -1,7 +1,6 @@
 //! A gamepad does what keys do: raw events, as its driver sends them, become actions. No pad, no window needed.
-#![cfg(feature = "render")]
 
-#[path = "common/devices.rs"]
+#[path = "../../bevy_marathon/tests/common/devices.rs"]
 mod devices;
 
 use bevy::input::gamepad::GamepadButton;

@@ -1,26 +1,22 @@
-//! A player tells an agent what to do: with the component [`AgentCommand`] in any app, with stick and arrow keys in
-//! `marathon-game`. The rover of `examples/rover.rs` takes a velocity; the trained one of the example `steer` drives at it.
-#![cfg(feature = "render")]
+//! A player steers characters in `marathon-game` with sticks and arrow keys. The rover of `examples/rover.rs` takes a velocity; the
+//! trained one of the plugin's example `steer` drives at it.
 
-#[path = "common/devices.rs"]
+#[path = "../../bevy_marathon/tests/common/devices.rs"]
 mod devices;
 #[path = "common/windowless.rs"]
 mod windowless;
 
-#[allow(dead_code, reason = "a part of it is enough")]
-mod common;
 #[allow(dead_code, reason = "its window stays closed")]
-#[path = "../examples/steer.rs"]
+#[path = "../../bevy_marathon/examples/steer.rs"]
 mod steer;
 
 use bevy::input::ButtonState;
-use bevy::input::InputPlugin;
 use bevy::input::gamepad::{GamepadAxis, GamepadButton};
 use bevy::prelude::*;
+use bevy_marathon::prelude::*;
 use clap::Parser;
 use devices::{key, pad, press, pull, push};
 use marathon_game::app::{Action, Actor, Args, Bindings, Steering};
-use marathon_game::prelude::*;
 use std::sync::LazyLock;
 use std::time::Duration;
 use windowless::frames;
@@ -44,76 +40,11 @@ fn game_of(agent: &str, words: &[&str]) -> App {
 
 /// What the actors are told, in their order.
 fn commands(app: &mut App) -> Vec<(f64, bool)> {
-    let mut query = app.world_mut().query::<(&Actor, &Episode, Has<AgentCommand>)>();
-    let mut all: Vec<_> = query.iter(app.world()).map(|(a, e, by_me)| (a.0, (e.command[0], by_me))).collect();
+    let mut query = app.world_mut().query::<(&Actor, &Episode, &AgentCommand)>();
+    let mut all: Vec<_> =
+        query.iter(app.world()).map(|(a, e, mine)| (a.0, (e.command[0], mine.values().is_some()))).collect();
     all.sort_by_key(|(number, _)| *number);
     all.into_iter().map(|(_, told)| told).collect()
-}
-
-/// What a component tells is observed at the end of the next decision, `None` is the schedule, and what cannot be told
-/// changes nothing.
-#[test]
-fn a_component_tells_an_agent_what_to_do() {
-    LazyLock::force(&ROVER);
-    let mut app = common::app(FRAME);
-    let mut spawn = |command: Option<AgentCommand>| {
-        let rover = app.world_mut().spawn(Ragdoll::agent("rover")).id();
-        if let Some(command) = command {
-            app.world_mut().entity_mut(rover).insert(command);
-        }
-        rover
-    };
-    let [told, own] = [Some(AgentCommand(Some(vec![1.5]))), None].map(&mut spawn);
-    let command = |app: &App, rover| app.world().get::<Episode>(rover).expect("it is there").command[0];
-    frames(&mut app, 3);
-    assert_eq!(command(&app, told), 1.5);
-    assert!(command(&app, own) != 1.5 && command(&app, own).abs() <= 2.0);
-    for wrong in [vec![2.5], vec![f64::NAN], vec![1.0, 1.0], vec![]] {
-        app.world_mut().entity_mut(told).insert(AgentCommand(Some(wrong)));
-        frames(&mut app, 3);
-        assert_eq!(command(&app, told), 1.5);
-    }
-    // twins of one seed and number have one schedule
-    app.world_mut().entity_mut(told).insert(AgentCommand(None));
-    frames(&mut app, 3);
-    assert_eq!(command(&app, told), command(&app, own));
-    app.world_mut().entity_mut(told).insert(AgentCommand(Some(vec![-2.0])));
-    frames(&mut app, 3);
-    assert_eq!(command(&app, told), -2.0);
-    app.world_mut().entity_mut(told).remove::<AgentCommand>();
-    frames(&mut app, 3);
-    assert_eq!(command(&app, told), command(&app, own));
-    // a lane that somebody else had is nobody's
-    app.world_mut().entity_mut(told).insert(AgentCommand(Some(vec![-2.0])));
-    frames(&mut app, 3);
-    assert!(app.world_mut().despawn(told));
-    frames(&mut app, 3);
-    let next = app.world_mut().spawn(Ragdoll::agent("rover")).id();
-    frames(&mut app, 3);
-    assert!(command(&app, next) != -2.0, "{}", command(&app, next));
-}
-
-#[test]
-fn the_example_drives_as_the_stick_says() {
-    let mut app = common::app(FRAME);
-    app.add_plugins((InputPlugin, steer::Driving(ROVER.clone())));
-    frames(&mut app, 3);
-    let pad = pad(&mut app);
-    let mut rover = app.world_mut().query::<(&RagdollState, &Episode)>();
-    let mut velocity = |app: &mut App| {
-        frames(app, 150);
-        let (state, episode) = rover.single(app.world()).expect("one rover");
-        let qvel = app.world().resource::<Marathon>().state(state).expect("it is simulated").qvel;
-        (episode.command[0], qvel[0])
-    };
-    for (stick, expected) in [(1.0, 2.0), (-1.0, -2.0), (0.0, 0.0)] {
-        push(&mut app, pad, GamepadAxis::LeftStickY, stick);
-        let (command, velocity) = velocity(&mut app);
-        assert_eq!(command, expected);
-        assert!((velocity - expected).abs() < 0.4, "told {expected} m/s, it drives at {velocity} m/s");
-    }
-    press(&mut app, pad, GamepadButton::South);
-    assert_ne!(velocity(&mut app).0, 0.0, "its own schedule");
 }
 
 #[test]

@@ -1,5 +1,4 @@
 //! A recording made with R is kept, whatever happens: other keys, other characters, the end of the game.
-#![cfg(feature = "render")]
 
 #[path = "common/windowless.rs"]
 mod windowless;

@@ -3,7 +3,7 @@
 //! And it shows what a Python environment sends through a pipe, in its time.
 //!
 //! Needs Xvfb, xdotool, imagemagick and a Vulkan device (Debian: xvfb xdotool imagemagick mesa-vulkan-drivers libvulkan1).
-#![cfg(all(feature = "render", target_os = "linux"))]
+#![cfg(target_os = "linux")]
 
 use std::error::Error;
 use std::io::{BufRead, BufReader, Read, Write};

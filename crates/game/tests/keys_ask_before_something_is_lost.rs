@@ -1,8 +1,7 @@
 //! A key that would lose something asks first: the same key means yes, S saves, Esc means no. Binding a key has no side
 //! effects.
-#![cfg(feature = "render")]
 
-#[path = "common/devices.rs"]
+#[path = "../../bevy_marathon/tests/common/devices.rs"]
 mod devices;
 #[path = "common/windowless.rs"]
 mod windowless;

@@ -2,7 +2,6 @@
 //! character in the middle; the same command draws the same picture; what is wrong is told in words.
 //!
 //! Needs a Vulkan device; a software one will do (Debian: mesa-vulkan-drivers libvulkan1).
-#![cfg(feature = "render")]
 
 use marathon_render::Image;
 use std::error::Error;

@@ -1,5 +1,4 @@
 //! The systems of the app, driven by its keys, without a window and without drawing.
-#![cfg(feature = "render")]
 
 #[path = "common/windowless.rs"]
 mod windowless;
@@ -8,13 +7,13 @@ use bevy::input::ButtonState;
 use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::prelude::*;
 use bevy::window::FileDragAndDrop;
+use bevy_marathon::axes::to_game;
+use bevy_marathon::look::{CameraMode, part_errors};
+use bevy_marathon::prelude::*;
 use marathon_game::app::{
     Action, Actor, Ball, Bindings, Focus, Mode, Notifications, Playback, Reading, Recorder, Recording, Scenario,
     SkinState, TrainingRun, WornSkin,
 };
-use marathon_game::axes::to_game;
-use marathon_game::look::{CameraMode, part_errors};
-use marathon_game::prelude::*;
 use marathon_render::Scene;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -290,7 +289,7 @@ fn a_ghost_moves_as_the_clip_does_and_keys_switch_it() -> Result<(), Box<dyn std
     for ms in -200..=200 {
         let (mut qpos, late) = (vec![0.0; model.nq], 0.001 * f64::from(ms));
         clip.qpos(decided - late, &mut qpos);
-        let places = marathon_game::stage::places(&model, &qpos).ok_or("a sound pose")?;
+        let places = bevy_marathon::pose::places(&model, &qpos).ok_or("a sound pose")?;
         let apart = places.iter().zip(&ghost).map(|(place, at)| place.translation.distance(*at));
         let apart = apart.fold(0.0, f32::max);
         if apart < nearest.0 {

@@ -1,8 +1,7 @@
 //! The table of the longest runs: runs have places on their course, the best keep their replays, and what is one too many goes. A
 //! file that is no table, damaged, or a later version's is left as it is, with one line that names it and the remedy.
-#![cfg(feature = "render")]
 
-use marathon_game::Ground;
+use bevy_marathon::Ground;
 use marathon_game::app::{Course, KEPT, ROWS, Recording, Row, Run, Table};
 use marathon_runs::Setting;
 use std::error::Error;

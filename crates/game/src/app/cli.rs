@@ -10,10 +10,10 @@ use crate::app::stage::clips::{FOLLOWER, follows_clip};
 use crate::app::stage::course::{self, CourseOptions, PlayerRole};
 use crate::app::stage::policies::ShippedPolicies;
 use crate::app::stage::scenario::{PolicySource, Scenario};
-use crate::characters::spec_of_role;
-use crate::ground::Ground;
-use crate::look::{CameraMode, Quality};
-use clap::{Parser, ValueEnum};
+use bevy_marathon::look::{CameraMode, Quality};
+use bevy_marathon::{Ground, spec_of_role};
+use clap::Parser;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use marathon_envs::registry;
 use marathon_learn::EvalOptions;
 use marathon_physics::Model;
@@ -65,8 +65,8 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
     pub agents: u16,
     /// Ground.
-    #[arg(long, value_enum, default_value_t = GroundArg::Level)]
-    pub ground: GroundArg,
+    #[arg(long, default_value = GROUNDS[0].0, value_parser = one_of(GROUNDS))]
+    pub ground: Ground,
     /// Options of the task [default: those that the policy was trained with].
     #[command(flatten)]
     pub task: TaskOptions,
@@ -133,14 +133,14 @@ pub struct Args {
     pub input: Vec<ScriptedInput>,
 
     /// Quality of the picture [default: medium, or low if a processor draws the window].
-    #[arg(long, value_enum)]
-    pub quality: Option<QualityArg>,
+    #[arg(long, value_parser = one_of(QUALITIES))]
+    pub quality: Option<Quality>,
     /// Size of the window or the film, pixels [default: 1280x720].
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<(u32, u32)>,
     /// Place of the camera.
-    #[arg(long, value_enum, default_value_t = CameraArg::Side)]
-    pub camera: CameraArg,
+    #[arg(long, default_value = CAMERAS[0].0, value_parser = one_of(CAMERAS))]
+    pub camera: CameraMode,
     /// Limit on the frames per second of the window; 0 for the rate of the screen.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub max_fps: u32,
@@ -221,7 +221,7 @@ impl Args {
 
     /// Quality of the picture.
     pub fn quality(&self) -> Quality {
-        self.quality.map_or(Quality::Medium, Quality::from)
+        self.quality.unwrap_or_default()
     }
 }
 
@@ -236,7 +236,7 @@ pub fn scenario(args: &Args, shipped: &ShippedPolicies) -> Result<Scenario, Game
         chosen: Setting::default(),
         source: PolicySource::Shipped,
         agents: usize::from(args.agents),
-        ground: args.ground.into(),
+        ground: args.ground,
         course: course_options(args)?,
         seed: args.seed(),
         model: None,
@@ -323,70 +323,38 @@ fn course_options(args: &Args) -> Result<CourseOptions, GameError> {
     Ok(CourseOptions { role: args.role.unwrap_or_default(), kind: args.course.clone().unwrap_or(own.kind), difficulty })
 }
 
-/// [`Ground`] on the command line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum GroundArg {
-    /// Level, as in training.
-    Level,
-    /// Waves that grow to 60 cm.
-    Hills,
-    /// Flights of five steps, up and down.
-    Stairs,
-    /// Low boards across the track.
-    Boards,
-}
+/// A value of an option: its name on the command line, and its help.
+type Choice<T> = (&'static str, T, &'static str);
 
-impl From<GroundArg> for Ground {
-    fn from(ground: GroundArg) -> Self {
-        match ground {
-            GroundArg::Level => Ground::Level,
-            GroundArg::Hills => Ground::Hills,
-            GroundArg::Stairs => Ground::Stairs,
-            GroundArg::Boards => Ground::Boards,
-        }
-    }
-}
+const GROUNDS: [Choice<Ground>; 4] = [
+    ("level", Ground::Level, "Level, as in training"),
+    ("hills", Ground::Hills, "Waves that grow to 60 cm"),
+    ("stairs", Ground::Stairs, "Flights of five steps, up and down"),
+    ("boards", Ground::Boards, "Low boards across the track"),
+];
 
-/// [`Quality`] on the command line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum QualityArg {
-    /// No shadows, no smoothed edges.
-    Low,
-    /// Shadows, edges smoothed.
-    Medium,
-    /// Larger shadow maps.
-    High,
-}
+const QUALITIES: [Choice<Quality>; 3] = [
+    ("low", Quality::Low, "No shadows, no smoothed edges"),
+    ("medium", Quality::Medium, "Shadows, edges smoothed"),
+    ("high", Quality::High, "Larger shadow maps"),
+];
 
-impl From<QualityArg> for Quality {
-    fn from(quality: QualityArg) -> Self {
-        match quality {
-            QualityArg::Low => Quality::Low,
-            QualityArg::Medium => Quality::Medium,
-            QualityArg::High => Quality::High,
-        }
-    }
-}
+const CAMERAS: [Choice<CameraMode>; 3] = [
+    ("side", CameraMode::Side, "Beside the runner"),
+    ("chase", CameraMode::Chase, "Behind it"),
+    ("orbit", CameraMode::Orbit, "Around it"),
+];
 
-/// [`CameraMode`] on the command line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum CameraArg {
-    /// Beside the runner.
-    Side,
-    /// Behind it.
-    Chase,
-    /// Around it.
-    Orbit,
-}
-
-impl From<CameraArg> for CameraMode {
-    fn from(camera: CameraArg) -> Self {
-        match camera {
-            CameraArg::Side => CameraMode::Side,
-            CameraArg::Chase => CameraMode::Chase,
-            CameraArg::Orbit => CameraMode::Orbit,
-        }
-    }
+/// Reads one of the choices by its name.
+fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
+    choices: [Choice<T>; N],
+) -> impl TypedValueParser<Value = T> {
+    let values = choices.map(|(name, _, help)| PossibleValue::new(name).help(help));
+    PossibleValuesParser::new(values).map(move |text| {
+        let chosen = choices.iter().find(|(name, ..)| *name == text);
+        // the parser lets only these names through
+        chosen.unwrap_or(&choices[0]).1
+    })
 }
 
 fn parse_size(text: &str) -> Result<(u32, u32), String> {
@@ -414,6 +382,20 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Args::command().debug_assert();
+    }
+
+    #[test]
+    fn choices_are_read_by_their_names() {
+        let read = |words: &[&str]| Args::try_parse_from([&["marathon-game"], words].concat());
+        let args = read(&["--ground", "stairs", "--quality", "high", "--camera", "orbit"]).expect("they exist");
+        assert_eq!((args.ground, args.quality, args.camera), (Ground::Stairs, Some(Quality::High), CameraMode::Orbit));
+        let args = read(&[]).expect("there are defaults");
+        assert_eq!((args.ground, args.quality, args.camera), (Ground::Level, None, CameraMode::Side));
+        let error = read(&["--ground", "hils"]).expect_err("there is no such ground").to_string();
+        assert!(
+            error.contains("level, hills, stairs, boards") && error.contains("similar value exists: 'hills'"),
+            "{error}"
+        );
     }
 
     #[test]

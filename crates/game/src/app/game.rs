@@ -15,11 +15,12 @@ use crate::app::stage::scenario::Scenario;
 use crate::app::stage::skin::SkinFile;
 use crate::app::ui::theme::Hud;
 use crate::app::{features, input, mode, notifications, pacing, stage, ui};
-use crate::ground::Ground;
-use crate::look::{FollowCameraPlugin, GhostPlugin, LookPlugin, MarksPlugin, Quality, SceneryPlugin, SkinPlugin};
-use crate::plugin::MarathonPlugin;
 use bevy::prelude::*;
 use bevy_egui::EguiPlugin;
+use bevy_marathon::look::{
+    FollowCameraPlugin, GhostPlugin, LookPlugin, MarksPlugin, Quality, SceneryPlugin, SkinPlugin,
+};
+use bevy_marathon::{Ground, MarathonPlugin};
 use marathon_runs::{RunError, Setting};
 
 /// Everything that the app adds to Bevy's own plugins.
@@ -88,7 +89,7 @@ impl GamePlugin {
             .insert_resource(Hud { on: !args.no_hud, help: false })
             .insert_resource(ShownMarks { contacts: args.contacts, joints: args.joints })
             .insert_resource(TrainingOptions { learn: args.learn.clone(), seed: args.seed() })
-            .insert_resource(FirstCamera(args.camera.into()))
+            .insert_resource(FirstCamera(args.camera))
             .insert_resource(args.fixed_settings())
             .insert_resource(args.mappings())
             .insert_resource(ScriptedActions::new(args.action.clone()))

@@ -19,7 +19,7 @@ mod stage;
 mod ui;
 mod video;
 
-pub use cli::{Args, CameraArg, GroundArg, QualityArg};
+pub use cli::Args;
 pub use error::GameError;
 pub use features::course::leaderboard::{Course, KEPT, Place, ROWS, Run, Table};
 pub use features::course::{List, MOST_STEPS, Runs, Site, Step};

@@ -7,7 +7,6 @@ use crate::app::features::replay::record::save_running;
 use crate::app::interrupt;
 use crate::app::pacing::{Filmed, TICKS};
 use crate::app::stage::skin::{SkinState, WornSkin};
-use crate::look::FollowCamera;
 use bevy::app::{PluginsState, TerminalCtrlCHandlerPlugin};
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::RenderTarget;
@@ -19,6 +18,7 @@ use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat, T
 use bevy::time::TimeUpdateStrategy;
 use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
+use bevy_marathon::look::FollowCamera;
 use marathon_render::{Format, Image as Picture, Recorder};
 use std::collections::VecDeque;
 use std::io::Write;

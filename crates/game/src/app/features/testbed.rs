@@ -5,11 +5,10 @@ use crate::app::mode::Mode;
 use crate::app::stage::actors::Actor;
 use crate::app::ui::hints::{KeyHints, ModeKeys};
 use crate::app::ui::theme::{Hud, UiSet, panel};
-use crate::ragdoll::{Anatomy, Controls};
-use crate::simulate::{Marathon, RagdollState};
 use bevy::prelude::*;
 use bevy_egui::egui::{self, RichText, Slider};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
+use bevy_marathon::{Anatomy, Controls, Marathon, RagdollState};
 use marathon_envs::AgentState;
 use marathon_physics::model::JointType;
 

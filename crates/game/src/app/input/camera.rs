@@ -5,13 +5,13 @@ use crate::app::input::actions::{Action, ActionPressed, Steering};
 use crate::app::mode::AppSet;
 use crate::app::notifications::Notifications;
 use crate::app::stage::scenario::Scenario;
-use crate::look::{CameraMode, FollowCamera};
 use bevy::input::gamepad::{Gamepad, GamepadAxis};
 use bevy::input::mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll};
 use bevy::prelude::*;
 use bevy::render::view::screenshot::{Screenshot, save_to_disk};
 use bevy_egui::PrimaryEguiContext;
 use bevy_egui::input::EguiWantsInput;
+use bevy_marathon::look::{CameraMode, FollowCamera};
 
 /// Radians per pixel of the mouse, and per second of a stick.
 const TURN: [f32; 2] = [0.005, 2.2];

@@ -8,8 +8,8 @@ use crate::app::stage::clips::next_clip;
 use crate::app::stage::policies::ShippedPolicies;
 use crate::app::stage::scenario::{LoadScenario, Scenario};
 use crate::app::stage::selection::next_agent;
-use crate::ragdoll::RestartNow;
 use bevy::prelude::*;
+use bevy_marathon::RestartNow;
 
 /// Speeds of time that the keys go through.
 const SPEEDS: [f32; 8] = [0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];

@@ -10,13 +10,11 @@ use crate::app::stage::actors::{Actor, Focus};
 use crate::app::stage::course::PlayerRole;
 use crate::app::stage::loaded::LoadedPolicy;
 use crate::app::stage::scenario::Scenario;
-use crate::ground::Ground;
-use crate::ragdoll::{AgentCommand, Anatomy, Restart};
-use crate::simulate::RagdollState;
 use bevy::input::InputSystems;
 use bevy::input::gamepad::{Gamepad, GamepadAxis};
 use bevy::prelude::*;
 use bevy_egui::input::EguiWantsInput;
+use bevy_marathon::{AgentCommand, Anatomy, Ground, RagdollState, Restart};
 use marathon_envs::CommandRange;
 
 /// Deflection ahead, to the left, and aside to the left, in [-1, 1], and two buttons, 0 or 1.
@@ -110,7 +108,6 @@ pub(super) fn plugin(app: &mut App) {
 #[expect(clippy::too_many_arguments, reason = "a system names what it uses")]
 #[allow(clippy::type_complexity, reason = "a query names what it reads")]
 fn steer(
-    mut commands: Commands,
     keys: Res<ButtonInput<KeyCode>>,
     pads: Query<(Entity, &Gamepad)>,
     wants: Option<Res<EguiWantsInput>>,
@@ -120,7 +117,7 @@ fn steer(
     mappings: Res<Mappings>,
     time: Res<Time<Real>>,
     mut deflections: Local<Deflections>,
-    mut actors: Query<(Entity, &Actor, &Anatomy, Option<&AgentCommand>, &mut Restart), With<RagdollState>>,
+    mut actors: Query<(&Actor, &Anatomy, Option<&mut AgentCommand>, &mut Restart), With<RagdollState>>,
 ) {
     let on_course = scenario.mode == Mode::Course;
     // on a course the runner stays under player control until the run ends
@@ -129,7 +126,7 @@ fn steer(
     let typing = wants.is_some_and(|w| w.wants_keyboard_input());
     deflections.update(&pads, of_keys((!typing).then_some(&*keys)), &mappings, time.delta_secs());
     let (mut own, count) = (Steering::default(), actors.iter().count());
-    for (entity, actor, anatomy, command, mut restart) in &mut actors {
+    for (actor, anatomy, command, mut restart) in &mut actors {
         let ranges = anatomy.spec.as_ref().map_or(&[][..], |spec| &spec.command);
         let player = (actor.0 + count).saturating_sub(focus.0) % count;
         let led = (player < deflections.players() || on_course) && !ranges.is_empty() && !spectator;
@@ -137,19 +134,20 @@ fn steer(
         if led && player == 0 {
             own = Steering { on: true, buttons: buttons(ranges).next().is_some() };
         }
-        let steered = led && !released && (command.is_some() || deflection != REST);
+        let values = command.as_ref().and_then(|command| command.values());
+        let steered = led && !released && (values.is_some() || deflection != REST);
         let timed = Restart { on_time_up: !steered && loaded.ground != Ground::Track, ..*restart };
         if !on_course && *restart != timed {
             *restart = timed;
         }
-        if !led || released {
-            if command.is_some() {
-                commands.entity(entity).remove::<AgentCommand>();
-            }
-        } else if steered {
-            let wanted = AgentCommand(Some(command_of(ranges, deflection)));
-            if command != Some(&wanted) {
-                commands.entity(entity).insert(wanted);
+        let wanted = steered.then(|| command_of(ranges, deflection));
+        if values != wanted.as_deref()
+            && let Some(mut command) = command
+        {
+            command.release();
+            for (range, x) in ranges.iter().zip(wanted.into_iter().flatten()) {
+                // a deflection is in the range
+                let _ = command.set(&range.name, x);
             }
         }
     }

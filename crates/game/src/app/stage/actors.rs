@@ -1,9 +1,9 @@
 //! The characters of the scenario, and the one in focus.
 
 use crate::app::mode::AppSet;
-use crate::look::{FollowCamera, Marks};
-use crate::ragdoll::Anatomy;
 use bevy::prelude::*;
+use bevy_marathon::Anatomy;
+use bevy_marathon::look::{FollowCamera, Marks};
 
 /// Ragdolls side by side before the next row begins behind.
 pub const ROW: usize = 16;

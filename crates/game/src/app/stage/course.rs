@@ -1,12 +1,10 @@
 //! Assault courses: the ground, its difficulty, and what the player does there.
 
-use crate::ground::Ground;
-use crate::ragdoll::{AgentCommand, Held, LaidGround};
+use bevy_marathon::{AgentCommand, Ground, Held, LaidGround};
 use clap::ValueEnum;
 use marathon_envs::options::Value;
-use marathon_envs::{CommandRange, Options, Spec, VecEnvOptions, registry};
+use marathon_envs::{Options, Spec, VecEnvOptions, registry};
 use marathon_runs::{RunError, Setting};
-use std::sync::Arc;
 
 /// The agent whose courses are laid below agents without courses of their own. They are the same at every y.
 const MODEL: &str = "TerrainWalker2d-v0";
@@ -116,8 +114,12 @@ impl CourseOptions {
     /// # Errors
     /// If there is no such course.
     pub fn equipment(&self, seed: u64, ground: Ground, spec: &Spec) -> Result<Equipment, RunError> {
-        let laid = if ground == Ground::Track { Some(LaidGround(Arc::new(self.elevations(seed)?))) } else { None };
-        let stand = || AgentCommand(Some(spec.command.iter().map(CommandRange::rest).collect()));
+        let laid = if ground == Ground::Track { Some(LaidGround(self.elevations(seed)?)) } else { None };
+        let stand = || {
+            let mut command = AgentCommand::new(&spec.command);
+            command.rest();
+            command
+        };
         let command = (self.role == PlayerRole::Run && !spec.command.is_empty()).then(stand);
         let held = (self.role == PlayerRole::Build).then(|| Held(vec![None; spec.act]));
         Ok(Equipment { laid, command, held })

@@ -1,8 +1,7 @@
 //! The policies that come with the game, and those of files.
 
-use crate::asset::PolicyAsset;
-use crate::characters::spec_of_role;
 use bevy::prelude::*;
+use bevy_marathon::{PolicyAsset, spec_of_role};
 use marathon_learn::{Policy as Net, checksum};
 use marathon_physics::budget;
 use marathon_runs::{Setting, policy_file};

@@ -1,10 +1,9 @@
 //! Characters whose poses come from a recording or from another program.
 
 use crate::app::stage::actors::Actor;
-use crate::look::{FollowCamera, Marks, Tint};
-use crate::ragdoll::{Anatomy, Episode, OwnGround, Part};
-use crate::stage;
 use bevy::prelude::*;
+use bevy_marathon::look::{FollowCamera, Marks, Tint};
+use bevy_marathon::{Anatomy, Episode, OwnGround, Part, pose};
 use marathon_envs::Spec;
 use marathon_physics::Model;
 use marathon_render::Scene;
@@ -51,7 +50,7 @@ pub fn spawn(
     for (number, place) in places.enumerate() {
         let here = (Actor(number), Transform::from_translation(place), Visibility::default());
         let puppet = commands.spawn((here, Marks::default(), Episode::default(), OwnGround::default())).id();
-        let parts = stage::parts(commands, &kind.model, puppet);
+        let parts = pose::spawn_parts(commands, &kind.model, puppet);
         let (model, spec) = (kind.model.clone(), kind.spec.clone());
         commands.entity(puppet).insert(Anatomy { model, spec, parts, feet: Vec::new(), dt: kind.dt });
         if number > 0 {
@@ -67,5 +66,5 @@ pub fn spawn(
 
 /// Moves the parts of a puppet.
 pub fn pose(anatomy: &Anatomy, qpos: &[f64], parts: &mut Query<&mut Transform, With<Part>>) {
-    stage::put(anatomy, stage::places(&anatomy.model, qpos), parts);
+    pose::put(anatomy, pose::places(&anatomy.model, qpos), parts);
 }

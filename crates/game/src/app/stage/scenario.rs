@@ -3,8 +3,8 @@
 use crate::app::mode::Mode;
 use crate::app::stage::course::{self, CourseOptions};
 use crate::app::stage::policies::ShippedPolicies;
-use crate::ground::Ground;
 use bevy::prelude::*;
+use bevy_marathon::Ground;
 use marathon_runs::{RunError, Setting, policy_file};
 use std::path::PathBuf;
 

@@ -7,11 +7,11 @@ use crate::app::stage::course;
 use crate::app::stage::loaded::{LoadedPolicy, read_opponent, read_policy, reload, written};
 use crate::app::stage::policies::ShippedPolicies;
 use crate::app::stage::scenario::{LoadScenario, PolicySource, Scenario};
-use crate::asset::{PolicyAsset, RagdollPrefab};
-use crate::ground::Ground;
-use crate::look::{FollowCamera, Marks, Tint};
-use crate::ragdoll::{AgentCommand, Held, LaidGround, Opponent, Policy, Ragdoll, Restart};
 use bevy::prelude::*;
+use bevy_marathon::look::{FollowCamera, Marks, Tint};
+use bevy_marathon::{
+    AgentCommand, CharacterPolicy, Ground, Held, LaidGround, Opponent, PolicyAsset, Ragdoll, RagdollPrefab, Restart,
+};
 use marathon_envs::registry;
 use marathon_physics::Model;
 use marathon_render::Scene;
@@ -87,7 +87,7 @@ pub fn spawn(
             actor.insert(Tint::of_row(i));
         }
         if let Some(policy) = &loaded.policy {
-            actor.insert(Policy(policy.clone()));
+            actor.insert(CharacterPolicy(policy.clone()));
         }
         if let Some(opponent) = &cast.opponent {
             actor.insert(Opponent(opponent.clone()));

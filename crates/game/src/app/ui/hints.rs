@@ -8,12 +8,12 @@ use crate::app::stage::actors::{Actor, Focus};
 use crate::app::stage::scenario::Scenario;
 use crate::app::ui::rewards;
 use crate::app::ui::theme::{ACCENT, CARD, FAINT, Hud, TEXT, UiSet, card, text};
-use crate::ragdoll::Anatomy;
 use bevy::input::gamepad::Gamepad;
 use bevy::prelude::*;
 use bevy_egui::egui::text::LayoutJob;
 use bevy_egui::egui::{self, Align2, Area, CornerRadius, FontId, Frame, Id, Label, Margin, TextFormat};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
+use bevy_marathon::Anatomy;
 use std::ops::Range;
 
 /// Window width below which the hints are hidden, and below which the line shows only the steering keys, so that they do not

@@ -4,11 +4,10 @@ use crate::app::mode::Mode;
 use crate::app::stage::actors::{Actor, Focus};
 use crate::app::ui::status;
 use crate::app::ui::theme::{FAINT, Hud, TEXT, UiSet, card, font, panel_id, spaced, text};
-use crate::plugin::MarathonSystems;
-use crate::ragdoll::{Anatomy, Episode};
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, Area, Color32, Id, Painter, Pos2, Rect, Sense, Stroke};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
+use bevy_marathon::{Anatomy, Episode, MarathonSystems};
 use std::collections::VecDeque;
 
 /// Decisions that the curves show.

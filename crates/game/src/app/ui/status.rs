@@ -5,12 +5,11 @@ use crate::app::stage::actors::{Actor, Focus};
 use crate::app::stage::scenario::Scenario;
 use crate::app::ui::hud;
 use crate::app::ui::theme::{ACCENT, BAD, FAINT, Hud, TEXT, UiSet, card, line, spaced, text};
-use crate::look::velocity_told;
-use crate::ragdoll::{AgentCommand, Anatomy, Episode};
-use crate::simulate::Marathon;
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, Area, Color32, Id, Sense, Ui};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
+use bevy_marathon::look::commanded_velocity;
+use bevy_marathon::{AgentCommand, Anatomy, Episode, Marathon};
 use marathon_envs::options::OptionValue;
 use marathon_envs::{Clips, CommandRange, Spec};
 
@@ -96,7 +95,7 @@ fn shown_speed(spec: &Spec, episode: &Episode) -> f32 {
         return episode.speed;
     }
     let [ahead, left] = episode.own_velocity;
-    match velocity_told(&spec.command, &episode.command) {
+    match commanded_velocity(&spec.command, &episode.command) {
         Some([a, l, _]) if a.hypot(l) > COMMANDED => {
             let (size, sign) = (a.hypot(l), if a < 0.0 { -1.0 } else { 1.0 });
             (sign / size) as f32 * (a as f32 * ahead + l as f32 * left)
@@ -123,6 +122,7 @@ pub fn draw(
     *smooth = if *smooth > 0.0 { *smooth + 0.05 * (delta - *smooth) } else { delta };
     let actor = actors.iter().find(|(a, ..)| a.0 == focus.0);
     if let Some((_, anatomy, episode, command)) = actor {
+        let steered = command.is_some_and(|command| command.values().is_some());
         Area::new(Id::new("who")).anchor(Align2::LEFT_TOP, [14.0, 14.0]).interactable(false).show(&ctx, |ui| {
             card().show(ui, |ui| {
                 let of = if scenario.agents > 1 {
@@ -154,14 +154,14 @@ pub fn draw(
                 }
                 if let Some(spec) = &anatomy.spec {
                     for (range, x) in spec.command.iter().zip(&episode.command) {
-                        let by = match (scenario.mode, command) {
+                        let by = match (scenario.mode, steered) {
                             (Mode::Replay, _) => "",
-                            (_, Some(_)) => "   by you",
-                            (_, None) => "   by its schedule",
+                            (_, true) => "   by you",
+                            (_, false) => "   by its schedule",
                         };
                         let words =
                             format!("{}: {} {}{by}", range.name.replace('_', " "), spaced(*x as f32), range.unit);
-                        line(ui, text(13.0, if command.is_some() { ACCENT } else { FAINT }, words));
+                        line(ui, text(13.0, if steered { ACCENT } else { FAINT }, words));
                     }
                     adversary(ui, spec, episode);
                 }

@@ -1,9 +1,9 @@
 //! The look of text and cards, and the order in which they are drawn.
 
-use crate::look::FollowCamera;
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, Area, Color32, CornerRadius, FontFamily, FontId, Frame, Id, Margin, RichText, Ui};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
+use bevy_marathon::look::FollowCamera;
 
 /// The color of cards.
 pub const CARD: Color32 = Color32::from_rgba_premultiplied(12, 16, 22, 205);

@@ -6,13 +6,13 @@ use crate::app::input::actions::{Action, ActionPressed};
 use crate::app::mode::{AppSet, Mode};
 use crate::app::stage::actors::{Actor, Focus};
 use crate::app::stage::scenario::{LoadScenario, Scenario};
-use crate::axes::to_game;
-use crate::look::FollowCamera;
-use crate::ragdoll::{Anatomy, Episode, Held, OwnGround};
 use bevy::input::mouse::{AccumulatedMouseScroll, MouseScrollUnit};
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_egui::input::EguiWantsInput;
+use bevy_marathon::axes::to_game;
+use bevy_marathon::look::FollowCamera;
+use bevy_marathon::{Anatomy, Episode, Held, OwnGround};
 use marathon_envs::agents::marathon::terrain::course::{CELL, FARTHEST, FROM, LEVEL_TO, POINTS};
 
 /// Steps up, and as many down.

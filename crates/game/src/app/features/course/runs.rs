@@ -9,13 +9,13 @@ use crate::app::stage::course::{BUILT, PlayerRole};
 use crate::app::stage::loaded::LoadedPolicy;
 use crate::app::stage::recording::Recording;
 use crate::app::stage::scenario::{LoadScenario, Scenario};
-use crate::ground::{Ground, TRACK_HALF_WIDTH};
-use crate::plugin::MarathonSystems;
-use crate::ragdoll::{Anatomy, End, Episode, EpisodeEnded, RestartNow};
-use crate::simulate::{Marathon, Seat};
 use bevy::prelude::*;
+use bevy_marathon::{
+    Anatomy, End, Episode, EpisodeEnded, Ground, Marathon, MarathonSystems, RagdollState, RestartNow, TRACK_HALF_WIDTH,
+};
 use marathon_envs::agents::marathon::terrain::course::TO;
 use marathon_envs::options::Value;
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -159,7 +159,7 @@ fn follow(
     mut runs: ResMut<Runs>,
     mut notes: ResMut<Notifications>,
     mut ended: MessageReader<EpisodeEnded>,
-    actors: Query<(Entity, &Actor, &Seat, &Anatomy, &Transform, &Episode)>,
+    actors: Query<(Entity, &Actor, &RagdollState, &Anatomy, &Transform, &Episode)>,
 ) {
     if *mode != Mode::Course {
         ended.clear();
@@ -167,13 +167,13 @@ fn follow(
     }
     let ended: Vec<EpisodeEnded> = ended.read().cloned().collect();
     runs.under_way.retain(|run| actors.contains(run.ragdoll));
-    for (entity, actor, seat, anatomy, track, episode) in &actors {
-        let Some(slot) = marathon.slot(*seat) else { continue };
+    for (entity, actor, state, anatomy, track, episode) in &actors {
+        let Some(history) = marathon.history(state) else { continue };
         let (mut finished, pace) = (None, f64::from(time.relative_speed()));
         let at = runs.under_way.iter().position(|run| run.ragdoll == entity);
         let mut run = at.map(|at| runs.under_way.swap_remove(at));
         let until = run.as_ref().map(|run| run.until);
-        for sample in slot.history.iter().filter(|sample| until.is_none_or(|until| sample.time > until)) {
+        for sample in history.iter().filter(|sample| until.is_none_or(|until| sample.time > until)) {
             if sample.fresh {
                 let place = track.translation.to_array().to_vec();
                 let recording = Recording::new(loaded.setting.clone(), loaded.ground, anatomy.dt, place);
@@ -258,15 +258,15 @@ fn referee(
     loaded: Res<LoadedPolicy>,
     marathon: Res<Marathon>,
     mut runs: ResMut<Runs>,
-    actors: Query<(Entity, &Seat, &Episode)>,
+    actors: Query<(Entity, &RagdollState, &Episode)>,
     mut restarts: MessageWriter<RestartNow>,
 ) {
     if loaded.ground != Ground::Track {
         return;
     }
     for run in runs.under_way.iter_mut().filter(|run| run.verdict.is_none() && !run.over) {
-        let Ok((ragdoll, seat, episode)) = actors.get(run.ragdoll) else { continue };
-        let Some(newest) = marathon.slot(*seat).and_then(|slot| slot.history.back()) else { continue };
+        let Ok((ragdoll, state, episode)) = actors.get(run.ragdoll) else { continue };
+        let Some(newest) = marathon.history(state).and_then(VecDeque::back) else { continue };
         if episode.farthest >= run.meters + 1.0 {
             (run.meters, run.since) = (episode.farthest.floor(), episode.seconds);
         }

@@ -14,10 +14,10 @@ use crate::app::stage::recording::PlayRecording;
 use crate::app::stage::scenario::{LoadScenario, Scenario};
 use crate::app::ui::menu;
 use crate::app::ui::theme::{ACCENT, BAD, FAINT, Hud, TEXT, UiSet, line, panel, text};
-use crate::ragdoll::Episode;
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, Ui};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
+use bevy_marathon::Episode;
 
 /// Keys that start the replay of the first, the second and so on of the course, while the list is open.
 const PLACES: [KeyCode; 9] = [

@@ -1,8 +1,8 @@
 //! The mailbox between the picture and the thread that talks to another program.
 
 use crate::app::stage::puppets::Kind;
-use crate::ragdoll::Episode;
 use bevy::prelude::*;
+use bevy_marathon::Episode;
 use marathon_mlagents::EngineSettings;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

@@ -3,6 +3,7 @@
 use crate::app::error::GameError;
 use crate::app::features::remote::mailbox::{RemotePose, RemoteSource, Shared, open};
 use crate::app::stage::puppets::Kind;
+use bevy_marathon::Episode;
 use marathon_mlagents::{Behavior, BehaviorOptions, Log, Player, PlayerOptions, Turn};
 use marathon_runs::Setting;
 use std::sync::Arc;
@@ -77,7 +78,7 @@ fn talk(player: &mut Player, shared: &Shared, agents: usize) -> Result<(), marat
 
 fn begin(pose: &mut RemotePose) {
     let number = pose.episode.number + 1;
-    pose.episode = crate::ragdoll::Episode { number, ..Default::default() };
+    pose.episode = Episode { number, ..Default::default() };
 }
 
 fn take_in(pose: &mut RemotePose, behavior: &Behavior, i: usize) {

@@ -15,11 +15,10 @@ use crate::app::stage::puppets;
 use crate::app::stage::scenario::LoadScenario;
 use crate::app::stage::spawn::spawn;
 use crate::app::ui::hints::{KeyHints, ModeKeys};
-use crate::look::{FollowCamera, Quality};
-use crate::ragdoll::{Anatomy, Episode, Part};
-use crate::simulate::Seat;
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
+use bevy_marathon::look::{FollowCamera, Quality};
+use bevy_marathon::{Anatomy, Episode, Part, RagdollState};
 use std::time::Duration;
 
 /// The window's size that ML-Agents sends by default, pixels.
@@ -61,7 +60,7 @@ fn spawn_puppets(mut commands: Commands, source: Res<RemoteSource>, mut cameras:
 /// Shows the newest poses.
 fn play(
     source: Res<RemoteSource>,
-    mut actors: Query<(&Actor, &Anatomy, &mut Episode), Without<Seat>>,
+    mut actors: Query<(&Actor, &Anatomy, &mut Episode), Without<RagdollState>>,
     mut parts: Query<&mut Transform, With<Part>>,
 ) {
     let mut mailbox = mailbox::open(&source.shared);

@@ -8,6 +8,7 @@
 use crate::app::error::GameError;
 use crate::app::features::remote::mailbox::{RemotePose, RemoteSource, Shared, open};
 use crate::app::stage::puppets::Kind;
+use bevy_marathon::Episode;
 use marathon_envs::registry;
 use marathon_physics::lanes::Isa;
 use marathon_physics::{Model, budget};
@@ -86,7 +87,7 @@ fn frames(
         let [begins, reward] = [numbers[0], numbers[1]];
         let episode = &mut pose.episode;
         if begins > 0.5 {
-            *episode = crate::ragdoll::Episode { number: episode.number + 1, ..Default::default() };
+            *episode = Episode { number: episode.number + 1, ..Default::default() };
         } else {
             // a model without joints has no coordinates
             let now = numbers.get(2).copied().unwrap_or_default();

@@ -10,13 +10,11 @@ use crate::app::stage::recording::{PlayRecording, Recording};
 use crate::app::stage::scenario::{LoadScenario, Scenario};
 use crate::app::stage::spawn;
 use crate::app::ui::theme::{Hud, UiSet, card};
-use crate::look::FollowCamera;
-use crate::ragdoll::{Anatomy, Episode, OwnGround, Part};
-use crate::simulate::Seat;
-use crate::stage;
 use bevy::prelude::*;
 use bevy_egui::egui::{Align2, Area, Id, Slider};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
+use bevy_marathon::look::FollowCamera;
+use bevy_marathon::{Anatomy, Episode, OwnGround, Part, RagdollState, pose};
 use marathon_runs::Setting;
 use std::path::Path;
 use std::sync::Arc;
@@ -105,7 +103,7 @@ fn spawn_puppets(mut commands: Commands, playback: Option<ResMut<Playback>>, mut
 fn play(
     playback: Option<ResMut<Playback>>,
     time: Res<Time<Virtual>>,
-    mut puppets: Query<(&Actor, &Anatomy, &mut Episode, &mut OwnGround), Without<Seat>>,
+    mut puppets: Query<(&Actor, &Anatomy, &mut Episode, &mut OwnGround), Without<RagdollState>>,
     mut parts: Query<&mut Transform, With<Part>>,
 ) {
     let Some(mut playback) = playback else { return };
@@ -131,7 +129,7 @@ fn play(
         let fresh = numbers[4] > 0.5 || now == 0;
         let before = (!fresh).then(|| recording.qpos(now - 1, actor.0));
         let here = recording.qpos(now, actor.0);
-        let own = before.and_then(|before| stage::own_velocity(&anatomy.model, before, here, recording.dt));
+        let own = before.and_then(|before| pose::own_velocity(&anatomy.model, before, here, recording.dt));
         episode.own_velocity = own.unwrap_or_default();
         episode.terms = recording.terms(now, actor.0).to_vec();
         episode.action = recording.action(now, actor.0).to_vec();

@@ -14,10 +14,8 @@ use crate::app::stage::spawn::{enter_mode, spawn};
 use crate::app::ui::question::{AtStake, ReportSet};
 use crate::app::ui::status::StatusLines;
 use crate::app::ui::theme::BAD;
-use crate::plugin::MarathonSystems;
-use crate::ragdoll::{Anatomy, Episode};
-use crate::simulate::{Marathon, Seat};
 use bevy::prelude::*;
+use bevy_marathon::{Anatomy, Episode, Marathon, MarathonSystems, RagdollState};
 use marathon_physics::budget;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -74,7 +72,7 @@ fn control(
     recorder: Option<Res<Recorder>>,
     mut notes: ResMut<Notifications>,
     mut requested: Local<bool>,
-    actors: Query<(&Actor, &Anatomy, &Transform), With<Seat>>,
+    actors: Query<(&Actor, &Anatomy, &Transform), With<RagdollState>>,
 ) {
     let recordable = scenario.mode.is_simulated() && scenario.mode != Mode::Testbed;
     *requested &= recordable;
@@ -162,7 +160,7 @@ fn keep(recording: &Recording) -> Result<PathBuf, GameError> {
 fn record(
     recorder: Option<ResMut<Recorder>>,
     marathon: Res<Marathon>,
-    actors: Query<(&Actor, &Seat, &Episode, &Anatomy)>,
+    actors: Query<(&Actor, &RagdollState, &Episode, &Anatomy)>,
 ) {
     let Some(mut recorder) = recorder else { return };
     let mut all: Vec<_> = actors.iter().collect();
@@ -171,7 +169,7 @@ fn record(
     if all.len() != recording.agents {
         return;
     }
-    let histories: Vec<_> = all.iter().filter_map(|(_, seat, ..)| marathon.slot(**seat)).map(|r| &r.history).collect();
+    let histories: Vec<_> = all.iter().filter_map(|(_, state, ..)| marathon.history(state)).collect();
     let Some(first) = histories.first() else { return };
     let times: Vec<Duration> = first.iter().map(|s| s.time).filter(|t| *t > *until).collect();
     for time in times {

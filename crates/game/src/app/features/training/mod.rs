@@ -16,10 +16,10 @@ use crate::app::stage::spawn::spawn;
 use crate::app::ui::hints::{KeyHints, ModeKeys};
 use crate::app::ui::question::{AtStake, DiscardPolicy, ReportSet};
 use crate::app::ui::theme::{ACCENT, FAINT, Hud, TEXT, UiSet, font, panel, text};
-use crate::asset::PolicyAsset;
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, Color32, Pos2, Sense, Stroke};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
+use bevy_marathon::PolicyAsset;
 use run::Point;
 
 /// Seconds between two lines of the log.

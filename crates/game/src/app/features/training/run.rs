@@ -2,8 +2,8 @@
 
 use crate::app::files::{file_stem, free_name};
 use crate::app::notifications::Notifications;
-use crate::ground::Ground;
 use bevy::prelude::*;
+use bevy_marathon::Ground;
 use marathon_learn::{Control, IterationStats, Policy, Snapshot, TrainConfig, train};
 use marathon_physics::lanes::Isa;
 use marathon_runs::{Flags, LearnOptions, RunError, RunOptions, Session, Setting, Task};

@@ -3,7 +3,7 @@
 use super::{Lie, NUMBERS, Recording};
 use crate::app::error::GameError;
 use crate::app::files::exists;
-use crate::ground::Ground;
+use bevy_marathon::Ground;
 use marathon_physics::budget;
 use marathon_runs::Setting;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};

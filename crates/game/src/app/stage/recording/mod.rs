@@ -4,11 +4,8 @@
 
 mod file;
 
-use crate::characters::PoseSample;
-use crate::ground::Ground;
-use crate::ragdoll::{Anatomy, Episode};
-use crate::stage;
 use bevy::prelude::*;
+use bevy_marathon::{Anatomy, Episode, Ground, PoseSample, pose};
 use marathon_physics::Model;
 use marathon_runs::Setting;
 use std::path::PathBuf;
@@ -183,7 +180,7 @@ impl Recording {
         if a == b || fresh {
             self.qpos(if share < 1.0 { a } else { b }, agent).to_vec()
         } else {
-            stage::mix(model, self.qpos(a, agent), self.qpos(b, agent), share)
+            pose::mix(model, self.qpos(a, agent), self.qpos(b, agent), share)
         }
     }
 

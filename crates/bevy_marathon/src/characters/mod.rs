@@ -1,0 +1,107 @@
+//! The simulation behind the ragdolls: batches of sixteen, stepped together in the lanes of the physics.
+//!
+//! Each ragdoll has a lane in a batch of its kind. Neither the lane nor the other ragdolls of the batch change its bits. Each
+//! kind has a clock, ahead of the game's by at most one decision, so that a frame always lies between two states.
+
+mod batch;
+mod slot;
+
+pub(crate) use batch::CharacterBatch;
+pub use slot::PoseSample;
+pub(crate) use slot::{Event, Shove, Slot};
+
+use crate::asset::RagdollPrefab;
+use crate::error::RagdollError;
+use crate::ground::Ground;
+use crate::ragdoll::Character;
+use bevy::prelude::*;
+use marathon_envs::Spec;
+use marathon_physics::Model;
+use marathon_physics::lanes::Isa;
+use marathon_runs::Setting;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Seconds that a prefab is simulated for at a time, about.
+const PREFAB_DT: f64 = 0.01;
+
+/// The task as the policy of role `role` sees it. `None` if the task has fewer roles. The first role keeps the task's id, because a policy
+/// for a task of one role can play it.
+pub fn spec_of_role(spec: &Spec, role: usize) -> Option<Spec> {
+    let part = spec.of_role(spec.deciders().get(role)?);
+    Some(if role == 0 { Spec { id: spec.id.clone(), ..part } } else { part })
+}
+
+/// All ragdolls of one kind.
+pub(crate) struct CharacterKind {
+    pub character: Character,
+    /// The task of an agent.
+    pub setting: Setting,
+    pub ground: Ground,
+    pub model: Arc<Model>,
+    pub spec: Option<Arc<Spec>>,
+    pub feet: Vec<Arc<str>>,
+    /// Physics steps per decision.
+    substeps: usize,
+    pub dt: f64,
+    /// Time between decisions.
+    pub period: Duration,
+    /// Time of the newest states.
+    pub time: Duration,
+    pub batches: Vec<CharacterBatch>,
+}
+
+impl CharacterKind {
+    /// The kind of an agent of the registry in a task and on a ground, without ragdolls yet.
+    pub fn of_agent(name: &str, setting: &Setting, ground: Ground, time: Duration) -> Result<Self, RagdollError> {
+        let agent = ground.agent_with(&setting.agent, &setting.options)?;
+        let spec = agent.clone().shards(Isa::best())?.spec().clone();
+        Ok(CharacterKind {
+            character: Character::Agent(name.into()),
+            setting: setting.clone(),
+            ground,
+            model: Arc::new(agent.model()?),
+            feet: agent.facts().feet.iter().map(|n| Arc::from(n.as_str())).collect(),
+            substeps: spec.frame_skip,
+            dt: spec.dt,
+            period: Duration::from_secs_f64(spec.dt),
+            spec: Some(Arc::new(spec)),
+            time,
+            batches: Vec::new(),
+        })
+    }
+
+    /// The kind of a body, without ragdolls yet.
+    pub fn of_prefab(prefab: &Handle<RagdollPrefab>, model: Arc<Model>, time: Duration) -> Self {
+        let substeps = (PREFAB_DT / model.opt.timestep).round().max(1.0) as usize;
+        let dt = substeps as f64 * model.opt.timestep;
+        CharacterKind {
+            character: Character::Prefab(prefab.clone()),
+            setting: Setting::default(),
+            ground: Ground::Level,
+            model,
+            feet: Vec::new(),
+            substeps,
+            dt,
+            period: Duration::from_secs_f64(dt),
+            spec: None,
+            time,
+            batches: Vec::new(),
+        }
+    }
+
+    /// Gives a ragdoll a free lane.
+    pub fn admit(&mut self, slot: Slot) -> Result<(usize, usize), RagdollError> {
+        let free = |batch: &CharacterBatch| batch.lanes.iter().position(Option::is_none);
+        let batch = match self.batches.iter().position(|batch| free(batch).is_some()) {
+            Some(batch) => batch,
+            None => {
+                self.batches.push(CharacterBatch::new(self)?);
+                self.batches.len() - 1
+            }
+        };
+        let lane = free(&self.batches[batch]).unwrap_or_default();
+        self.batches[batch].admit(lane, slot, self.time);
+        Ok((batch, lane))
+    }
+}

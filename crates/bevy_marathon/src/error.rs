@@ -1,0 +1,73 @@
+//! Errors of ragdolls and their commands.
+
+use marathon_envs::{CommandRange, EnvError};
+use marathon_physics::{SimError, hint};
+use marathon_runs::RunError;
+use thiserror::Error;
+
+/// An error of a [`Ragdoll`](crate::Ragdoll): it cannot be simulated, or an input does not fit it.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum RagdollError {
+    /// The registry has no such agent, or the agent does not take an option.
+    #[error(transparent)]
+    Task(#[from] RunError),
+    /// The agent or its ground is refused.
+    #[error(transparent)]
+    Env(#[from] EnvError),
+    /// The physics refuses the model.
+    #[error(transparent)]
+    Sim(#[from] SimError),
+    /// A body without a task takes no commands.
+    #[error("a body without a task takes no command")]
+    NoCommand,
+    /// A body without a task has no ground of its own.
+    #[error("a body without a task has no ground of its own")]
+    NoGround,
+    /// A state has too few or too many numbers.
+    #[error("{vector} has {found} numbers, expected {expected}")]
+    StateLength {
+        /// `qpos` or `qvel`.
+        vector: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length of the model's.
+        expected: usize,
+    },
+    /// A state has a number that is not finite.
+    #[error("{vector} has a number that is {found}, expected finite ones")]
+    StateNumber {
+        /// `qpos` or `qvel`.
+        vector: &'static str,
+        /// The number.
+        found: f64,
+    },
+}
+
+/// An error of a number that [`AgentCommand::set`](crate::AgentCommand::set) refuses.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum CommandError {
+    /// The character takes no commands, or is not in the simulation yet.
+    #[error("no command '{name}': the character takes no commands, or is not in the simulation yet")]
+    NoCommands {
+        /// The name that was given.
+        name: String,
+    },
+    /// The command has no number of this name.
+    #[error("no command '{name}'{}", hint::among(name, known))]
+    Unknown {
+        /// The name that was given.
+        name: String,
+        /// The names of the character's task.
+        known: Vec<String>,
+    },
+    /// The value is outside the range of its number.
+    #[error("command '{}' is {value}, expected {} to {} {}", range.name, range.low, range.high, range.unit)]
+    OutOfRange {
+        /// The number with its range and unit.
+        range: CommandRange,
+        /// The value that was given.
+        value: f64,
+    },
+}

@@ -1,0 +1,91 @@
+//! Physical characters for Bevy: ragdolls from MJCF that move by learned policies, in any Bevy app.
+//!
+//! | `bevy_marathon` | Bevy |
+//! |---|---|
+//! | 0.1 | 0.19 |
+//!
+//! Add [`MarathonPlugin`], spawn a [`Ragdoll`], give it a [`CharacterPolicy`]:
+//!
+//! ```no_run
+//! use bevy::prelude::*;
+//! use bevy_marathon::prelude::*;
+//!
+//! fn main() {
+//!     App::new()
+//!         .add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default(), MarathonPlugin))
+//!         .add_systems(Startup, |mut commands: Commands, assets: Res<AssetServer>| {
+//!             let policy = assets.load("policies/hopper.safetensors");
+//!             commands.spawn((Ragdoll::agent("hopper"), CharacterPolicy(policy)));
+//!         })
+//!         .add_systems(Update, |mut falls: MessageReader<EpisodeEnded>| {
+//!             for fall in falls.read() {
+//!                 println!("{:?} after {:.1} m", fall.end, fall.episode.distance);
+//!             }
+//!         })
+//!         .run();
+//! }
+//! ```
+//!
+//! An agent that takes commands has an [`AgentCommand`]: `command.set("speed", 2.0)?` steers it.
+//!
+//! The simulation is that of `marathon train` and `marathon eval`: the same seed gives the same bits in both,
+//! at every frame rate.
+//!
+//! Ragdolls and the bodies of another physics engine can touch: in the example `avian_props`, a hopper runs into a wall of
+//! avian's boxes.
+//!
+//! The plugin registers its components for reflection, so inspectors and scenes can read and write them. [`Anatomy`],
+//! [`RagdollState`] and [`Unfit`] are not registered: the plugin makes them, and a scene cannot.
+//!
+//! # Features
+//!
+//! | feature | default | adds |
+//! |---|---|---|
+//! | `render` | yes | the module `look`: plugins that draw ragdolls |
+//! | `window` | yes | Bevy's window, input devices and glTF reader |
+//!
+//! Without features nothing draws and no renderer is compiled, as a server needs it.
+
+pub mod asset;
+pub mod axes;
+mod characters;
+mod command;
+mod error;
+mod ground;
+#[cfg(feature = "render")]
+pub mod look;
+mod marathon;
+mod plugin;
+pub mod pose;
+mod ragdoll;
+mod simulate;
+
+pub use asset::{PolicyAsset, RagdollPrefab};
+pub use characters::{PoseSample, spec_of_role};
+pub use command::AgentCommand;
+pub use error::{CommandError, RagdollError};
+pub use ground::{Ground, TRACK_HALF_WIDTH};
+pub use marathon::{Marathon, RagdollState};
+pub use plugin::{MarathonPlugin, MarathonSystems};
+pub use ragdoll::*;
+
+/// The names that most apps need.
+pub mod prelude {
+    #[cfg(feature = "render")]
+    pub use crate::look::{
+        ErrorColors, FollowCamera, FollowCameraPlugin, Ghost, GhostPlugin, LookPlugin, Marks, MarksPlugin, Quality,
+        SceneryPlugin, Skin, SkinPlugin, Tint,
+    };
+    pub use crate::plugin::{MarathonPlugin, MarathonSystems};
+    pub use crate::ragdoll::*;
+    pub use crate::{
+        AgentCommand, CommandError, Ground, Marathon, PolicyAsset, RagdollError, RagdollPrefab, RagdollState,
+    };
+    pub use marathon_physics::Variation;
+    pub use marathon_runs::Setting;
+}
+
+/// The programs of the README are compiled as tests.
+#[cfg(all(doctest, feature = "window"))]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,0 +1,81 @@
+//! The plugin: its systems and their order.
+
+use crate::asset::{MjcfLoader, PolicyAsset, PolicyLoader, RagdollPrefab};
+use crate::command::AgentCommand;
+use crate::marathon::Marathon;
+use crate::ragdoll::{
+    CharacterPolicy, Controls, Episode, EpisodeBegan, EpisodeEnded, FootContact, Held, LaidGround, Opponent, OwnGround,
+    Part, Physique, Push, Ragdoll, Restart, RestartNow, Target, TargetReached,
+};
+use crate::simulate;
+use bevy::prelude::*;
+
+/// Ragdolls for any Bevy app.
+///
+/// The simulation runs in [`FixedUpdate`] whatever the timestep there: every kind of ragdoll decides at the rate of its
+/// task. Frames show the state at their own time, between two decisions.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MarathonPlugin;
+
+/// The systems of [`MarathonPlugin`], in their order. All but the last run in [`FixedUpdate`].
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum MarathonSystems {
+    /// New ragdolls enter the simulation; changed components and pushes are taken in. Write [`crate::Controls`], [`Push`]
+    /// and [`RestartNow`] before this.
+    Admit,
+    /// Policies decide and the physics steps, for as many decisions as are due.
+    Simulate,
+    /// [`crate::Episode`]s and messages are written. Read them after this.
+    Report,
+    /// In [`RunFixedMainLoop`], after the fixed loop: the transforms of all parts, at the time of the frame.
+    Show,
+}
+
+impl Plugin for MarathonPlugin {
+    fn build(&self, app: &mut App) {
+        register_types(app);
+        app.init_asset::<RagdollPrefab>()
+            .init_asset::<PolicyAsset>()
+            .init_asset_loader::<MjcfLoader>()
+            .init_asset_loader::<PolicyLoader>()
+            .init_resource::<Marathon>()
+            .add_message::<Push>()
+            .add_message::<RestartNow>()
+            .add_message::<FootContact>()
+            .add_message::<EpisodeEnded>()
+            .add_message::<EpisodeBegan>()
+            .add_message::<TargetReached>()
+            .configure_sets(
+                FixedUpdate,
+                (MarathonSystems::Admit, MarathonSystems::Simulate, MarathonSystems::Report).chain(),
+            )
+            .configure_sets(RunFixedMainLoop, MarathonSystems::Show.in_set(RunFixedMainLoopSystems::AfterFixedMainLoop))
+            .add_systems(
+                FixedUpdate,
+                (
+                    (simulate::admit, simulate::take_in, simulate::push).chain().in_set(MarathonSystems::Admit),
+                    simulate::simulate.in_set(MarathonSystems::Simulate),
+                    (simulate::report, simulate::face_targets).chain().in_set(MarathonSystems::Report),
+                ),
+            )
+            .add_systems(RunFixedMainLoop, simulate::show.in_set(MarathonSystems::Show))
+            .add_observer(simulate::dismiss);
+    }
+}
+
+/// Lets inspectors and scenes read and write the components.
+fn register_types(app: &mut App) {
+    app.register_type::<Ragdoll>()
+        .register_type::<CharacterPolicy>()
+        .register_type::<Opponent>()
+        .register_type::<Controls>()
+        .register_type::<Held>()
+        .register_type::<AgentCommand>()
+        .register_type::<LaidGround>()
+        .register_type::<Target>()
+        .register_type::<Physique>()
+        .register_type::<Restart>()
+        .register_type::<OwnGround>()
+        .register_type::<Episode>()
+        .register_type::<Part>();
+}

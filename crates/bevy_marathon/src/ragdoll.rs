@@ -1,0 +1,309 @@
+//! Components and messages of ragdolls.
+
+use crate::asset::{PolicyAsset, RagdollPrefab};
+use crate::error::RagdollError;
+use crate::ground::Ground;
+use bevy::prelude::*;
+use bevy::reflect::reflect_remote;
+use marathon_envs::Spec;
+use marathon_physics::{Model, Variation};
+use marathon_runs::Setting;
+use std::sync::Arc;
+
+/// A physical character. Its [`Transform`] is where its track begins and which way it runs (along its own +x); the
+/// simulated bodies are children, see [`Anatomy`].
+///
+/// Its life depends on the character, `seed`, `number` and what acts on it: not on the frame rate, and not on the other
+/// ragdolls of the world.
+#[derive(Component, Clone, Debug, Reflect)]
+#[reflect(Component, Clone, Debug)]
+#[require(Transform, Episode, Restart, OwnGround)]
+pub struct Ragdoll {
+    /// What it is.
+    pub character: Character,
+    /// Seed of its random starts.
+    pub seed: u64,
+    /// Which of the seed's agents it is: `marathon eval --seed S` plays the agents 0, 1, 2 ... of seed S.
+    pub number: u64,
+    /// What an agent runs on; a prefab brings its own.
+    pub ground: Ground,
+    /// An agent's task with its arguments and clips. `None`: what its [`CharacterPolicy`] notes when the ragdoll enters the simulation,
+    /// which waits for a policy that is still being loaded; without a policy, the defaults. Scenes do not keep it.
+    #[reflect(ignore)]
+    pub setting: Option<Setting>,
+}
+
+/// Kind of a [`Ragdoll`].
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Reflect)]
+pub enum Character {
+    /// An agent of the registry, such as `hopper` or `Humanoid-v1`, with its task: it observes, earns rewards and fails. A
+    /// [`CharacterPolicy`] moves it.
+    Agent(String),
+    /// A body without a task. [`Controls`] move it.
+    Prefab(Handle<RagdollPrefab>),
+}
+
+impl Ragdoll {
+    fn new(character: Character) -> Self {
+        Ragdoll { character, seed: 0, number: 0, ground: Ground::Level, setting: None }
+    }
+
+    /// An agent of the registry; to add one's own, see [`marathon_envs::register`].
+    pub fn agent(name: impl Into<String>) -> Self {
+        Self::new(Character::Agent(name.into()))
+    }
+
+    /// A body loaded from MJCF.
+    pub fn prefab(prefab: Handle<RagdollPrefab>) -> Self {
+        Self::new(Character::Prefab(prefab))
+    }
+
+    /// The same as agent `number` of another seed.
+    pub fn with_seed(mut self, seed: u64, number: u64) -> Self {
+        (self.seed, self.number) = (seed, number);
+        self
+    }
+
+    /// The same with a task of these arguments, whatever its policy notes.
+    pub fn with_setting(mut self, setting: Setting) -> Self {
+        self.setting = Some(setting);
+        self
+    }
+
+    /// The same on another ground.
+    pub fn on(mut self, ground: Ground) -> Self {
+        self.ground = ground;
+        self
+    }
+}
+
+/// What decides for a [`Ragdoll`] that is an agent. When the asset changes, the next decision is the new policy's.
+#[derive(Component, Clone, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Component, Clone, Debug, PartialEq)]
+pub struct CharacterPolicy(pub Handle<PolicyAsset>);
+
+/// The actions of a [`Ragdoll`] that something else decides for: one number per actuator, in the units of
+/// [`Spec::action_low`] for an agent, in the actuator's own for a prefab. It goes before a [`CharacterPolicy`].
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Default, Clone, Debug, PartialEq)]
+pub struct Controls(pub Vec<f32>);
+
+/// The policy of the second role of a [`Ragdoll`]'s task, if it has [roles](marathon_envs::RoleFacts); [`CharacterPolicy`] is then that of
+/// the first.
+#[derive(Component, Clone, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Component, Clone, Debug, PartialEq)]
+pub struct Opponent(pub Handle<PolicyAsset>);
+
+/// Some of a [`Ragdoll`]'s actions, by actuator, that something decides in place of its policies; `None` leaves one to them.
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Default, Clone, Debug, PartialEq)]
+pub struct Held(pub Vec<Option<f32>>);
+
+/// Ground that is laid below a [`Ragdoll`]: elevations of its model's first height field, as [`OwnGround`] has them. It stays over
+/// all episodes, unless the task draws ground of its own.
+#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[reflect(Component, Clone, Debug, PartialEq)]
+pub struct LaidGround(pub Vec<f32>);
+
+/// A place to run to. At the start of every episode the ragdoll is turned towards it; [`TargetReached`] tells of the
+/// arrival.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Component, Clone, Debug, PartialEq)]
+pub struct Target {
+    /// The place, in the world's axes; its height does not matter.
+    pub place: Vec3,
+    /// Distance at which it counts as reached, m.
+    pub radius: f32,
+}
+
+/// What this ragdoll has of its own: masses, friction, strength of the actuators, gravity. Take
+/// [`Variation::none`] of [`Anatomy::model`] and change it.
+#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[reflect(Component, Clone, Debug, PartialEq)]
+pub struct Physique(#[reflect(remote = VariationFields)] pub Variation);
+
+/// The fields of [`Variation`] for reflection.
+#[reflect_remote(Variation)]
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct VariationFields {
+    pub mass: Vec<f64>,
+    pub friction: f64,
+    pub strength: Vec<f64>,
+    pub gravity: [f64; 3],
+}
+
+/// What happens when an episode has ended.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Component, Default, Clone, Debug, PartialEq)]
+pub struct Restart {
+    /// Seconds that it lies limp after a fall; infinity: for good. 0 is what training and evaluation do.
+    pub after_fall: f64,
+    /// Whether the episode also restarts at the task's time limit. If not, it continues. Once off, it stays off to the
+    /// end of the episode.
+    pub on_time_up: bool,
+}
+
+impl Default for Restart {
+    /// At once, as in training.
+    fn default() -> Self {
+        Restart { after_fall: 0.0, on_time_up: true }
+    }
+}
+
+/// The ground that a [`Ragdoll`] stands on: elevations of each height field of its model, m above the field's zero, by rows. Written
+/// by the plugin whenever it changes; empty without height fields.
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Default, Clone, Debug, PartialEq)]
+pub struct OwnGround(#[reflect(ignore)] pub Arc<Vec<Vec<f32>>>);
+
+/// The present episode of a [`Ragdoll`]. Written by the plugin after every decision.
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Default, Clone, Debug, PartialEq)]
+pub struct Episode {
+    /// Number of the episode, the first being 1; 0 before it has begun.
+    pub number: u64,
+    /// Decisions made.
+    pub decisions: u64,
+    /// Simulated seconds.
+    pub seconds: f64,
+    /// Sum of the rewards.
+    pub total: f64,
+    /// Reward of the last decision.
+    pub reward: f32,
+    /// Its terms, in the order of [`Spec::reward_terms`].
+    pub terms: Vec<f32>,
+    /// What the agent reports of the state reached, in the order of [`Spec::info`].
+    pub info: Vec<f32>,
+    /// Distance run along the track, m.
+    pub distance: f64,
+    /// Farthest that it has come along the track, m.
+    pub farthest: f64,
+    /// Speed along the track in the last decision, m/s.
+    pub speed: f32,
+    /// Velocity of the free body along its forward axis and to its left in the last decision, m/s; 0 for planar
+    /// characters.
+    pub own_velocity: [f32; 2],
+    /// Actions of the last decision.
+    pub action: Vec<f32>,
+    /// The command that it observes, in the order of [`Spec::command`]: of its [`AgentCommand`](crate::AgentCommand), or of its own schedule.
+    pub command: Vec<f64>,
+    /// Feet on the ground in the last decision: a bit each, in the order of [`Anatomy::feet`].
+    pub feet: u32,
+    /// It has fallen and lies limp, see [`Restart`].
+    pub down: bool,
+    /// The episode has no time limit, because [`Restart::on_time_up`] was off in one of its decisions.
+    pub untimed: bool,
+}
+
+/// What a [`Ragdoll`] is made of. Added by the plugin when the ragdoll has entered the simulation.
+#[derive(Component, Clone, Debug)]
+pub struct Anatomy {
+    /// The compiled model.
+    pub model: Arc<Model>,
+    /// The task, if the ragdoll is an agent.
+    pub spec: Option<Arc<Spec>>,
+    /// The bodies, one entity per body of the model; the first is the world, which does not move. Each has a [`Part`].
+    pub parts: Vec<Entity>,
+    /// Names of the geoms that may touch the ground.
+    pub feet: Vec<Arc<str>>,
+    /// Seconds between decisions.
+    pub dt: f64,
+}
+
+impl Anatomy {
+    /// The entity of a body by name.
+    pub fn part(&self, name: &str) -> Option<Entity> {
+        self.model.bodies.iter().position(|b| b.name == name).and_then(|i| self.parts.get(i).copied())
+    }
+}
+
+/// A body of a [`Ragdoll`]: a child whose [`Transform`] the plugin writes every frame. What is attached to it is carried
+/// along. Where it is in a tick between frames, [`crate::Marathon::places`] knows.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Component, Clone, Debug, PartialEq)]
+pub struct Part {
+    /// Whose it is.
+    #[entities]
+    pub ragdoll: Entity,
+    /// Index in the model's bodies.
+    pub body: usize,
+}
+
+/// A [`Ragdoll`] that cannot be simulated, and why. Added by the plugin. Remove it to try again.
+#[derive(Component, Clone, Debug)]
+pub struct Unfit(pub Arc<RagdollError>);
+
+/// Pushes a ragdoll.
+#[derive(Message, Clone, Copy, Debug, PartialEq)]
+pub struct Push {
+    /// Whom.
+    pub ragdoll: Entity,
+    /// Which body of its model.
+    pub body: usize,
+    /// Force in the world's axes, N.
+    pub force: Vec3,
+    /// Where, in the world's axes; `None`: at the body's center of mass.
+    pub at: Option<Vec3>,
+    /// How long, s; it lasts at least one decision.
+    pub seconds: f64,
+}
+
+/// Starts a new episode.
+#[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RestartNow {
+    /// Whose.
+    pub ragdoll: Entity,
+}
+
+/// A foot has touched the ground, or left it.
+#[derive(Message, Clone, Debug, PartialEq)]
+pub struct FootContact {
+    /// Whose foot.
+    pub ragdoll: Entity,
+    /// Index in [`Anatomy::feet`].
+    pub foot: usize,
+    /// Whether it has touched.
+    pub down: bool,
+}
+
+/// Why an episode ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// The agent failed: it fell.
+    Fell,
+    /// The task's time was up.
+    TimeUp,
+    /// Its simulation stopped being finite.
+    Broke,
+    /// [`RestartNow`].
+    Asked,
+}
+
+/// An episode has ended: a fall, or the end of the time.
+#[derive(Message, Clone, Debug, PartialEq)]
+pub struct EpisodeEnded {
+    /// Whose.
+    pub ragdoll: Entity,
+    /// Why.
+    pub end: End,
+    /// How it went.
+    pub episode: Episode,
+}
+
+/// An episode has begun: the ragdoll has been reset.
+#[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EpisodeBegan {
+    /// Whose.
+    pub ragdoll: Entity,
+    /// Number of the episode.
+    pub number: u64,
+}
+
+/// A ragdoll has reached its [`Target`].
+#[derive(Message, Clone, Copy, Debug, PartialEq)]
+pub struct TargetReached {
+    /// Which ragdoll.
+    pub ragdoll: Entity,
+    /// Where it was going.
+    pub target: Target,
+}

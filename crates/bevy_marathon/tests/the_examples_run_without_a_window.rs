@@ -1,0 +1,89 @@
+//! The examples run in an app without a window and without a graphics card, and the first program of the README is as short as it says.
+#![cfg(feature = "window")]
+
+#[allow(dead_code, reason = "its command line is left out")]
+#[path = "../examples/headless_server.rs"]
+mod headless_server;
+#[path = "../examples/own_character.rs"]
+mod own_character;
+#[allow(dead_code, reason = "its window stays closed")]
+#[path = "../examples/ragdoll.rs"]
+mod ragdoll;
+#[allow(dead_code, reason = "its window stays closed")]
+#[path = "../examples/wear_a_skin.rs"]
+mod wear_a_skin;
+
+use bevy::log::LogPlugin;
+use bevy::prelude::*;
+use bevy::render::RenderPlugin;
+use bevy::render::settings::WgpuSettings;
+use bevy::time::TimeUpdateStrategy;
+use bevy::window::ExitCondition;
+use bevy::winit::WinitPlugin;
+use bevy_marathon::look::{Dressed, UnfitSkin};
+use bevy_marathon::prelude::*;
+use std::time::Duration;
+
+/// Bevy's default plugins and those of an example, after the start.
+fn windowless<M>(example: impl Plugins<M>) -> App {
+    let assets = AssetPlugin { file_path: concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets").into(), ..default() };
+    let window = WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
+    let render = RenderPlugin { render_creation: WgpuSettings { backends: None, ..default() }.into(), ..default() };
+    let plugins = DefaultPlugins.set(assets).set(window).set(render).disable::<WinitPlugin>().disable::<LogPlugin>();
+    let mut app = App::new();
+    app.add_plugins(plugins).add_plugins(example);
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(10)));
+    app.finish();
+    app.cleanup();
+    app
+}
+
+/// Runs frames until a condition holds. Files are read on other threads.
+fn run_until(app: &mut App, what: &str, done: impl Fn(&mut World) -> bool) {
+    for _ in 0..4000 {
+        app.update();
+        if done(app.world_mut()) {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    panic!("4000 frames without: {what}");
+}
+
+#[test]
+fn the_humanoid_runs() {
+    let mut app = windowless(ragdoll::humanoid);
+    run_until(&mut app, "a humanoid that has run a meter", |world| {
+        world.query::<&Episode>().iter(world).any(|episode| episode.farthest > 1.0)
+    });
+    assert_eq!(app.world_mut().query::<&FollowCamera>().iter(app.world()).count(), 1);
+}
+
+#[test]
+fn the_figure_is_worn() {
+    let mut app = windowless(wear_a_skin::Dressing("skins/marathon_man.glb".into()));
+    run_until(&mut app, "a figure that is worn or refused", |world| {
+        world.query_filtered::<(), Or<(With<Dressed>, With<UnfitSkin>)>>().iter(world).count() > 0
+    });
+    assert_eq!(app.world_mut().query::<&UnfitSkin>().iter(app.world()).next(), None);
+}
+
+#[test]
+fn the_server_stops_after_its_time() {
+    assert_eq!(headless_server::server(0.5).run(), AppExit::Success);
+}
+
+#[test]
+fn the_snail_is_trained_and_played() -> Result<(), Box<dyn std::error::Error>> {
+    own_character::main()
+}
+
+/// `cargo test --doc` compiles it.
+#[test]
+fn the_first_program_of_the_readme_has_fifteen_lines_at_most() {
+    let readme = include_str!("../README.md");
+    let program = readme.split("```").nth(1).expect("it has a block of code");
+    assert!(program.contains("fn main()") && program.contains("AgentCommand"), "{program}");
+    let lines = program.lines().skip(1).filter(|line| !line.trim().is_empty()).count();
+    assert!(lines <= 15, "{lines} lines");
+}
