@@ -6,7 +6,8 @@ mod common;
 
 use bevy::ecs::reflect::ReflectComponent;
 use bevy::prelude::*;
-use bevy::reflect::{DynamicStruct, TypePath, TypeRegistry};
+use bevy::reflect::structs::DynamicStruct;
+use bevy::reflect::{TypePath, TypeRegistry};
 use bevy_marathon::prelude::*;
 use std::time::Duration;
 

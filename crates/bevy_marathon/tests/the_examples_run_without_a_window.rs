@@ -65,7 +65,8 @@ fn the_figure_is_worn() {
     run_until(&mut app, "a figure that is worn or refused", |world| {
         world.query_filtered::<(), Or<(With<Dressed>, With<UnfitSkin>)>>().iter(world).count() > 0
     });
-    assert_eq!(app.world_mut().query::<&UnfitSkin>().iter(app.world()).next(), None);
+    let refused = app.world_mut().query::<&UnfitSkin>().iter(app.world()).next();
+    assert!(refused.is_none(), "{refused:?}");
 }
 
 #[test]

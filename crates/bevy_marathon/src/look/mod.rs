@@ -17,7 +17,7 @@ pub use ghost::{ErrorColors, Ghost, GhostPlugin, part_errors};
 pub use marks::{Marks, MarksPlugin, commanded_velocity};
 pub use quality::Quality;
 pub use scenery::SceneryPlugin;
-pub use skin::{Dressed, Skin, SkinPlugin, UnfitSkin};
+pub use skin::{Dressed, Skin, SkinError, SkinPlugin, UnfitSkin};
 
 /// Colors of a row of ragdolls, one after the other.
 pub const TINTS: [[f32; 3]; 8] = [

@@ -9,16 +9,18 @@ use crate::look::body::BodyMesh;
 use crate::look::ghost::ErrorColors;
 use crate::plugin::MarathonSystems;
 use crate::ragdoll::{Anatomy, Part};
-use bevy::asset::LoadState;
+use bevy::asset::{AssetLoadError, LoadState};
 use bevy::camera::visibility::NoFrustumCulling;
 use bevy::ecs::entity::EntityHashMap;
 use bevy::mesh::skinning::SkinnedMesh;
 use bevy::prelude::*;
-use marathon_motion::{Bone, Mapping, Skeleton, SkeletonPoser};
+use marathon_motion::{Bone, Mapping, MotionError, Skeleton, SkeletonPoser};
 use std::borrow::Cow;
 use std::collections::HashSet;
 use std::f32::consts::FRAC_1_SQRT_2;
 use std::path::Path;
+use std::sync::Arc;
+use thiserror::Error;
 
 /// From the axes of the physics to those of the game.
 const AXES: Quat = Quat::from_xyzw(-FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2);
@@ -54,8 +56,26 @@ impl Skin {
 }
 
 /// On a ragdoll: why it does not wear its [`Skin`].
-#[derive(Component, Clone, Debug, PartialEq, Eq)]
-pub struct UnfitSkin(pub String);
+#[derive(Component, Clone, Debug)]
+pub struct UnfitSkin(pub SkinError);
+
+/// An error of a [`Skin`] that does not fit its ragdoll.
+#[derive(Clone, Debug, Error)]
+#[non_exhaustive]
+pub enum SkinError {
+    /// The scene cannot be loaded.
+    #[error(transparent)]
+    Load(Arc<AssetLoadError>),
+    /// The scene has no skeleton.
+    #[error("it has no skinned mesh, expected a character with a skeleton")]
+    NoSkeleton,
+    /// The skin's mapping does not fit its skeleton or the model.
+    #[error(transparent)]
+    Mapping(MotionError),
+    /// The skin brings no mapping, and the one that comes with Marathon does not know its bones.
+    #[error("{0}; rename its bones, as Mixamo or Blender's Rigify calls them, or write a mapping that names them")]
+    UnknownBones(MotionError),
+}
 
 /// On a ragdoll: it wears its [`Skin`].
 #[derive(Component, Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,7 +139,7 @@ fn fit(
                 let nodes = tree(&scene.world);
                 fitted(&nodes, anatomy, skin).map(|fitted| (scene, nodes, fitted))
             }
-            (None, LoadState::Failed(error)) => Err(error.to_string()),
+            (None, LoadState::Failed(error)) => Err(SkinError::Load(error)),
             _ => continue,
         };
         match result {
@@ -207,19 +227,14 @@ fn spawn(commands: &mut Commands, below: Entity, scene: &World, tree: &[Node], f
 }
 
 /// How the skeleton of a scene follows a ragdoll, what is above its first bone, and the nodes of its bones.
-fn fitted(tree: &[Node], anatomy: &Anatomy, skin: &Skin) -> Result<(SkeletonPoser, Transform, Vec<usize>), String> {
+fn fitted(tree: &[Node], anatomy: &Anatomy, skin: &Skin) -> Result<(SkeletonPoser, Transform, Vec<usize>), SkinError> {
     let Some((above, bones, skeleton)) = skeleton(tree) else {
-        return Err("it has no skinned mesh, expected a character with a skeleton".into());
+        return Err(SkinError::NoSkeleton);
     };
     let (path, model) = (Path::new("skin"), &*anatomy.model);
     let mapping = match &skin.mapping {
-        Some(text) => Mapping::parse(path, text.as_bytes(), &skeleton, model).map_err(|error| error.to_string()),
-        None => Mapping::built_in(path, &skeleton, model).map_err(|error| {
-            format!(
-                "{error}; rename its bones, as Mixamo or Blender's Rigify calls them, or write a mapping that names them: --mapping \
-                 FILE.json, as `marathon motion import` takes it"
-            )
-        }),
+        Some(text) => Mapping::parse(path, text.as_bytes(), &skeleton, model).map_err(SkinError::Mapping),
+        None => Mapping::built_in(path, &skeleton, model).map_err(SkinError::UnknownBones),
     };
     let poser = SkeletonPoser::new(model, &mapping?, &skeleton);
     Ok((poser, above, bones))

@@ -9,7 +9,7 @@ use bevy::asset::io::embedded::EmbeddedAssetRegistry;
 use bevy::gltf::GltfAssetLabel;
 use bevy::prelude::*;
 use bevy_marathon::Anatomy;
-use bevy_marathon::look::{Dressed, Skin, UnfitSkin};
+use bevy_marathon::look::{Dressed, Skin, SkinError, UnfitSkin};
 use marathon_physics::budget;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -159,7 +159,11 @@ fn report(
     let path = skin.path.display().to_string();
     if let Some(UnfitSkin(problem)) = unfit.iter().next() {
         let mapping = skin.mapping.as_ref().map(|m| format!(" by the mapping {}", m.path.display()));
-        let text = format!("{path} cannot be worn{}: {problem}", mapping.unwrap_or_default());
+        let option = match problem {
+            SkinError::UnknownBones(_) => ": --mapping FILE.json, as `marathon motion import` takes it",
+            _ => "",
+        };
+        let text = format!("{path} cannot be worn{}: {problem}{option}", mapping.unwrap_or_default());
         if skin.state != SkinState::Refused(text.clone()) {
             notes.error(text.clone());
             skin.state = SkinState::Refused(text);
