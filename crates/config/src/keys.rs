@@ -307,8 +307,11 @@ pub fn all() -> Vec<String> {
 
 /// The path of the first key with a name, for a name that stands in the wrong section.
 pub fn elsewhere(name: &str) -> Option<String> {
-    let found = KEYS.iter().find(|key| key.name.eq_ignore_ascii_case(name) && !key.sections.contains(&""))?;
-    paths(found).next()
+    let known = |path: &String| path.rsplit('.').next().is_some_and(|last| last.eq_ignore_ascii_case(name));
+    // a reward's network has a learning rate, too, which is hardly meant
+    let mut found: Vec<String> = all().into_iter().filter(known).collect();
+    found.sort_by_key(|path| path.starts_with("rewards."));
+    found.into_iter().next()
 }
 
 /// The place of a key or section in the order of the reference.

@@ -15,6 +15,8 @@ pub const OPTIONS: &str = "options";
 const ROLES: &str = "roles";
 const TASKS: &str = "tasks";
 const PRESET: &str = "preset";
+/// Most levels of a key.
+const MOST_LEVELS: usize = 8;
 /// Section of ML-Agents' files, which a misspelled key may mean.
 const BEHAVIORS: &str = "behaviors";
 
@@ -102,9 +104,12 @@ impl Layer {
     pub fn set(text: &str) -> Result<Self, ConfigError> {
         let path = Path::new("--set");
         let (key, value) = text.split_once('=').unwrap_or((text, ""));
+        let place = Place::of("--set", &shown(key));
+        if key.split('.').count() > MOST_LEVELS {
+            return Err(ConfigError::unknown(place, key, &names(Part::Task)));
+        }
         let mut entries = document::parse(path, format!("value: {value}").as_bytes())?.entries;
         let (Some(field), true) = (entries.pop(), entries.is_empty()) else {
-            let place = Place { file: path.into(), line: 0, key: shown(key) };
             return Err(ConfigError::value(place, format!("'{}'", shown(value)), "one value"));
         };
         let mut map = Map { entries: vec![field] };
@@ -127,7 +132,7 @@ impl Layer {
             [first, second, ..] => {
                 let place = layer.place(second).cloned();
                 let expected = format!("settings of one algorithm, {first} or {second}");
-                let place = place.unwrap_or_else(|| Place { file: "".into(), line: 0, key: second.into() });
+                let place = place.unwrap_or_else(|| Place::of("configuration", second));
                 Err(ConfigError::value(place, "another algorithm", expected))
             }
         }

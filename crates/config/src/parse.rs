@@ -80,6 +80,9 @@ pub fn convert(path: &Path, bytes: &[u8]) -> Result<(String, Vec<String>), Confi
         let name = names::task(behavior).filter(|name| !tasks.contains_key(*name)).unwrap_or(behavior);
         tasks.insert(name.into(), loaded.differences().into());
     }
+    if mlagents::has_default(&map) && !behaviors.is_empty() {
+        notes.push("what serves all behaviors is part of each task here; other tasks have Marathon's defaults".into());
+    }
     let mut file = Object::from_iter([("preset".to_string(), Json::Bool(false))]);
     match behaviors.is_empty() {
         // the settings that serve all

@@ -133,12 +133,12 @@ fn damaged_checkpoints_are_refused() {
     for (from, to, text) in [
         ("marathon-checkpoint", "marathon-policy", "format: found"),
         (
-            "\"version\": 2",
+            "\"version\": 3",
             "\"version\": 1",
             "checkpoint.json: version: found 1, expected 3, which this program supports",
         ),
         (
-            "\"version\": 2",
+            "\"version\": 3",
             "\"version\": 7",
             "checkpoint.json: version: found 7, expected 3, which this program supports",
         ),

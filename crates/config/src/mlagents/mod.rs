@@ -68,6 +68,11 @@ pub fn read(path: &Path, map: &Map, task: &str) -> Result<Loaded, ConfigError> {
     Ok(loaded)
 }
 
+/// Whether a file has settings that serve all behaviors.
+pub fn has_default(map: &Map) -> bool {
+    map.keys().any(|key| key == if is_current(map) { "default_settings" } else { DEFAULT })
+}
+
 /// The behaviors of a file, without those of roles.
 ///
 /// # Errors
