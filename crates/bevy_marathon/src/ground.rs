@@ -4,7 +4,7 @@
 //! begin as in training.
 
 use marathon_envs::agents::marathon::terrain::course::{FROM, POINTS, TO};
-use marathon_envs::{AnyAgent, Elsewhere, EnvError, ModelSource, Options, Registry, registry};
+use marathon_envs::{AnyAgent, EnvError, ModelSource, Options, Registry, WithModel, registry};
 use marathon_physics::mjcf::MjcfError;
 use marathon_physics::spec::{ElementRef, Geom, HField, Kind, ModelSpec};
 use std::f64::consts::TAU;
@@ -116,7 +116,7 @@ impl Ground {
             let problem = "its model has no level floor of its own, which a course could replace";
             return Err(EnvError::Agent { id: facts.id, problem: problem.into() });
         }
-        Ok(Arc::new(Elsewhere::new(agent, ModelSource::from(spec))))
+        Ok(Arc::new(WithModel::new(agent, ModelSource::from(spec))))
     }
 
     /// A registry that has an agent on this ground, and the arguments that are still to be given to it.

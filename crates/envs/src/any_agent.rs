@@ -56,7 +56,7 @@ pub trait AnyAgent: Send + Sync {
         }
         self.shards_as(facts, isa)
     }
-    /// The same with other facts, such as another model; see [`Elsewhere`].
+    /// The same with other facts, such as another model; see [`WithModel`].
     ///
     /// # Errors
     /// As [`AnyAgent::shards`].
@@ -64,19 +64,19 @@ pub trait AnyAgent: Send + Sync {
 }
 
 /// An agent with another model: the same body and task on other ground.
-pub struct Elsewhere {
+pub struct WithModel {
     agent: Arc<dyn AnyAgent>,
     model: ModelSource,
 }
 
-impl Elsewhere {
+impl WithModel {
     /// Replaces an agent's model.
     pub fn new(agent: Arc<dyn AnyAgent>, model: ModelSource) -> Self {
-        Elsewhere { agent, model }
+        WithModel { agent, model }
     }
 }
 
-impl AnyAgent for Elsewhere {
+impl AnyAgent for WithModel {
     fn facts(&self) -> Facts {
         Facts { model: self.model.clone(), ..self.agent.facts() }
     }
@@ -91,7 +91,7 @@ impl AnyAgent for Elsewhere {
 
     fn with_options(self: Arc<Self>, options: &Options) -> Result<Arc<dyn AnyAgent>, EnvError> {
         let agent = self.agent.clone().with_options(options)?;
-        Ok(Arc::new(Elsewhere { agent, model: self.model.clone() }))
+        Ok(Arc::new(WithModel { agent, model: self.model.clone() }))
     }
 
     fn shards_as(self: Arc<Self>, facts: Facts, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {

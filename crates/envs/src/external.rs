@@ -2,7 +2,7 @@
 //! language, where a call for all agents costs as much as a call for one.
 //!
 //! A learner's threads own blocks and normally run a rollout without waiting for each other. Here they synchronize at
-//! every decision. Each thread [announces](Shard::announce) its actions, the last one steps the whole [`Crowd`], and
+//! every decision. Each thread [announces](Shard::announce) its actions, the last one steps the whole [`BatchTask`], and
 //! all continue with their own rows of the result.
 
 use crate::error::EnvError;
@@ -13,73 +13,73 @@ use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// The error of a [`Crowd`].
-pub type CrowdError = Box<dyn std::error::Error + Send + Sync>;
+/// The error of a [`BatchTask`].
+pub type BatchTaskError = Box<dyn std::error::Error + Send + Sync>;
 
 /// All agents of a task, stepped together. When an episode ends, the next one starts within the same step.
-pub trait Crowd: Send {
+pub trait BatchTask: Send {
     /// Starts the first episodes with a seed and writes the observations, `[agents][obs]`.
     ///
     /// # Errors
     /// If the task fails.
-    fn reset(&mut self, seed: u64, obs: &mut [f32]) -> Result<(), CrowdError>;
+    fn reset(&mut self, seed: u64, obs: &mut [f32]) -> Result<(), BatchTaskError>;
     /// Executes one decision of every agent. `actions` is `[agents][act]`.
     ///
     /// # Errors
     /// If the task fails.
-    fn step(&mut self, actions: &[f32], out: StepMut<'_>) -> Result<(), CrowdError>;
+    fn step(&mut self, actions: &[f32], out: StepMut<'_>) -> Result<(), BatchTaskError>;
     /// The complete state.
     ///
     /// # Errors
     /// If the task fails.
-    fn save(&self) -> Result<Vec<u8>, CrowdError>;
-    /// Restores a state of [`Crowd::save`].
+    fn save(&self) -> Result<Vec<u8>, BatchTaskError>;
+    /// Restores a state of [`BatchTask::save`].
     ///
     /// # Errors
     /// If the bytes are not such a state.
-    fn load(&mut self, bytes: &[u8]) -> Result<(), CrowdError>;
+    fn load(&mut self, bytes: &[u8]) -> Result<(), BatchTaskError>;
 }
 
 /// A [`VecEnv`] with [`Autoreset::SameStep`](crate::Autoreset::SameStep).
-impl Crowd for VecEnv {
-    fn reset(&mut self, seed: u64, obs: &mut [f32]) -> Result<(), CrowdError> {
+impl BatchTask for VecEnv {
+    fn reset(&mut self, seed: u64, obs: &mut [f32]) -> Result<(), BatchTaskError> {
         Ok(VecEnv::reset(self, Some(seed), obs)?)
     }
 
-    fn step(&mut self, actions: &[f32], out: StepMut<'_>) -> Result<(), CrowdError> {
+    fn step(&mut self, actions: &[f32], out: StepMut<'_>) -> Result<(), BatchTaskError> {
         Ok(VecEnv::step(self, actions, out)?)
     }
 
-    fn save(&self) -> Result<Vec<u8>, CrowdError> {
+    fn save(&self) -> Result<Vec<u8>, BatchTaskError> {
         Ok(VecEnv::save(self))
     }
 
-    fn load(&mut self, bytes: &[u8]) -> Result<(), CrowdError> {
+    fn load(&mut self, bytes: &[u8]) -> Result<(), BatchTaskError> {
         Ok(VecEnv::load(self, bytes)?)
     }
 }
 
-/// Panic payload of threads after the crowd has failed, without a message; see [`Lockstep::take_error`].
+/// Panic payload of threads after the task has failed, without a message; see [`BatchAdapter::take_error`].
 #[derive(Debug)]
-pub struct CrowdFailed;
+pub struct BatchTaskFailed;
 
-/// Creates shards of one [`Crowd`]. Together they must cover all of its blocks and announce all actions. After all of
-/// them are dropped, the next ones restart the crowd.
-pub struct Lockstep {
+/// Creates shards of one [`BatchTask`]. Together they must cover all of its blocks and announce all actions. After all of
+/// them are dropped, the next ones restart the task.
+pub struct BatchAdapter {
     spec: Spec,
     agents: usize,
-    meeting: Arc<Meeting>,
+    barrier: Arc<Barrier>,
 }
 
 /// The barrier of the shards.
-struct Meeting {
-    hall: Mutex<Hall>,
+struct Barrier {
+    shared: Mutex<Shared>,
     decided: Condvar,
 }
 
-struct Hall {
-    crowd: Box<dyn Crowd>,
-    /// Seed of the crowd's first episodes, once they have begun.
+struct Shared {
+    task: Box<dyn BatchTask>,
+    /// Seed of the task's first episodes, once they have begun.
     begun: Option<u64>,
     /// `[agents][act]`.
     actions: Vec<f32>,
@@ -90,32 +90,36 @@ struct Hall {
     present: usize,
     /// Number of decisions.
     round: u64,
-    error: Option<CrowdError>,
+    error: Option<BatchTaskError>,
     failed: bool,
 }
 
-impl Lockstep {
-    /// Wraps a crowd of `agents` agents, a multiple of [`BLOCK`].
+impl BatchAdapter {
+    /// Wraps a task of `agents` agents, a multiple of [`BLOCK`].
     ///
     /// # Panics
     /// If it is not such a multiple.
-    pub fn new(crowd: Box<dyn Crowd>, spec: Spec, agents: usize) -> Self {
+    pub fn new(task: Box<dyn BatchTask>, spec: Spec, agents: usize) -> Self {
         assert!(agents > 0 && agents.is_multiple_of(BLOCK), "{agents} agents are not whole blocks of {BLOCK}");
         let out = Step::new(agents, &spec);
         let actions = vec![0.0; agents * spec.act];
-        let hall =
-            Hall { crowd, begun: None, actions, out, shards: 0, present: 0, round: 0, error: None, failed: false };
-        Lockstep { spec, agents, meeting: Arc::new(Meeting { hall: Mutex::new(hall), decided: Condvar::new() }) }
+        let shared =
+            Shared { task, begun: None, actions, out, shards: 0, present: 0, round: 0, error: None, failed: false };
+        BatchAdapter {
+            spec,
+            agents,
+            barrier: Arc::new(Barrier { shared: Mutex::new(shared), decided: Condvar::new() }),
+        }
     }
 
-    /// The crowd's error. When the crowd fails, all threads that use its shards unwind with [`CrowdFailed`], and their
+    /// The task's error. When the task fails, all threads that use its shards unwind with [`BatchTaskFailed`], and their
     /// starter catches that.
-    pub fn take_error(&self) -> Option<CrowdError> {
-        self.meeting.enter().error.take()
+    pub fn take_error(&self) -> Option<BatchTaskError> {
+        self.barrier.enter().error.take()
     }
 }
 
-impl ShardFactory for Lockstep {
+impl ShardFactory for BatchAdapter {
     fn spec(&self) -> &Spec {
         &self.spec
     }
@@ -123,11 +127,11 @@ impl ShardFactory for Lockstep {
     fn shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn Shard> {
         let agents = first * BLOCK..(first + blocks) * BLOCK;
         assert!(agents.end <= self.agents, "block {} of {}", first + blocks, self.agents / BLOCK);
-        self.meeting.enter().shards += 1;
+        self.barrier.enter().shards += 1;
         Box::new(LockstepShard {
             spec: self.spec.clone(),
             own: Step::new(agents.len(), &self.spec),
-            meeting: self.meeting.clone(),
+            barrier: self.barrier.clone(),
             agents,
             seed,
             announced: 0,
@@ -139,32 +143,32 @@ impl ShardFactory for Lockstep {
     }
 }
 
-impl Meeting {
-    fn enter(&self) -> MutexGuard<'_, Hall> {
-        // a panic of the crowd leaves no half-finished state that is used later
-        self.hall.lock().unwrap_or_else(PoisonError::into_inner)
+impl Barrier {
+    fn enter(&self) -> MutexGuard<'_, Shared> {
+        // a panic of the task leaves no half-finished state that is used later
+        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Runs an operation of the crowd. If it fails, all waiting and later threads unwind.
-    fn attempt<R>(&self, hall: &mut Hall, f: impl FnOnce(&mut Hall) -> Result<R, CrowdError>) -> R {
-        let mut reason: Box<dyn Any + Send> = Box::new(CrowdFailed);
-        if !hall.failed {
-            match catch_unwind(AssertUnwindSafe(|| f(hall))) {
+    /// Runs an operation of the task. If it fails, all waiting and later threads unwind.
+    fn attempt<R>(&self, shared: &mut Shared, f: impl FnOnce(&mut Shared) -> Result<R, BatchTaskError>) -> R {
+        let mut reason: Box<dyn Any + Send> = Box::new(BatchTaskFailed);
+        if !shared.failed {
+            match catch_unwind(AssertUnwindSafe(|| f(shared))) {
                 Ok(Ok(result)) => return result,
-                Ok(Err(error)) => hall.error = Some(error),
+                Ok(Err(error)) => shared.error = Some(error),
                 Err(panic) => reason = panic,
             }
-            hall.failed = true;
+            shared.failed = true;
             self.decided.notify_all();
         }
         resume_unwind(reason)
     }
 }
 
-/// A range of blocks of a [`Crowd`].
+/// A range of blocks of a [`BatchTask`].
 struct LockstepShard {
     spec: Spec,
-    meeting: Arc<Meeting>,
+    barrier: Arc<Barrier>,
     agents: Range<usize>,
     seed: u64,
     /// Results of the last decision for the shard's agents.
@@ -189,10 +193,10 @@ impl LockstepShard {
 
 impl Drop for LockstepShard {
     fn drop(&mut self) {
-        let mut hall = self.meeting.enter();
-        hall.shards -= 1;
-        if hall.shards == 0 {
-            (hall.begun, hall.present) = (None, 0);
+        let mut shared = self.barrier.enter();
+        shared.shards -= 1;
+        if shared.shards == 0 {
+            (shared.begun, shared.present) = (None, 0);
         }
     }
 }
@@ -206,25 +210,25 @@ impl Shard for LockstepShard {
         self.agents.len() / BLOCK
     }
 
-    /// At the start, begins the episodes of all agents of the crowd. Later, returns the first observations of the
+    /// At the start, begins the episodes of all agents of the task. Later, returns the first observations of the
     /// episodes that the last decision has begun.
     fn reset(&mut self, block: usize, mask: u16, obs: &mut [f32]) {
-        let meeting = self.meeting.clone();
-        let mut hall = meeting.enter();
-        if hall.begun.is_none() {
+        let barrier = self.barrier.clone();
+        let mut shared = barrier.enter();
+        if shared.begun.is_none() {
             let seed = self.seed;
-            meeting.attempt(&mut hall, |hall| hall.crowd.reset(seed, &mut hall.out.obs));
-            hall.begun = Some(seed);
+            barrier.attempt(&mut shared, |shared| shared.task.reset(seed, &mut shared.out.obs));
+            shared.begun = Some(seed);
         }
         let n = self.spec.obs;
-        self.show(&hall.out.obs[self.agents.start * n..self.agents.end * n], block, mask, obs);
+        self.show(&shared.out.obs[self.agents.start * n..self.agents.end * n], block, mask, obs);
     }
 
     fn announce(&mut self, actions: &[f32]) {
         let act = self.spec.act;
-        let meeting = self.meeting.clone();
-        let mut hall = meeting.enter();
-        let rows = &mut hall.actions[self.agents.start * act..self.agents.end * act];
+        let barrier = self.barrier.clone();
+        let mut shared = barrier.enter();
+        let rows = &mut shared.actions[self.agents.start * act..self.agents.end * act];
         for (rows, block) in rows.chunks_exact_mut(BLOCK * act).zip(actions.chunks_exact(act * BLOCK)) {
             for (i, row) in rows.chunks_exact_mut(act).enumerate() {
                 for (a, x) in row.iter_mut().enumerate() {
@@ -232,25 +236,25 @@ impl Shard for LockstepShard {
                 }
             }
         }
-        hall.present += self.agents.len();
-        if hall.present * act == hall.actions.len() {
-            meeting.attempt(&mut hall, |hall| {
-                let Hall { crowd, actions, out, .. } = hall;
-                crowd.step(actions, out.into())
+        shared.present += self.agents.len();
+        if shared.present * act == shared.actions.len() {
+            barrier.attempt(&mut shared, |shared| {
+                let Shared { task, actions, out, .. } = shared;
+                task.step(actions, out.into())
             });
-            hall.present = 0;
-            hall.round += 1;
-            meeting.decided.notify_all();
+            shared.present = 0;
+            shared.round += 1;
+            barrier.decided.notify_all();
         } else {
-            let round = hall.round;
-            while hall.round == round && !hall.failed {
-                hall = meeting.decided.wait(hall).unwrap_or_else(PoisonError::into_inner);
+            let round = shared.round;
+            while shared.round == round && !shared.failed {
+                shared = barrier.decided.wait(shared).unwrap_or_else(PoisonError::into_inner);
             }
-            if hall.round == round {
-                resume_unwind(Box::new(CrowdFailed));
+            if shared.round == round {
+                resume_unwind(Box::new(BatchTaskFailed));
             }
         }
-        self.own.copy_rows(&hall.out, &self.spec, self.agents.clone());
+        self.own.copy_rows(&shared.out, &self.spec, self.agents.clone());
         self.announced = self.blocks();
     }
 
@@ -274,11 +278,11 @@ impl Shard for LockstepShard {
         out.diverged = bits(&own.diverged);
     }
 
-    /// The first block holds the state of the whole crowd.
+    /// The first block holds the state of the whole task.
     fn save(&self, block: usize, bytes: &mut Vec<u8>) {
         if self.agents.start + block == 0 {
-            let mut hall = self.meeting.enter();
-            bytes.extend(self.meeting.attempt(&mut hall, |hall| hall.crowd.save()));
+            let mut shared = self.barrier.enter();
+            bytes.extend(self.barrier.attempt(&mut shared, |shared| shared.task.save()));
         }
     }
 
@@ -286,7 +290,7 @@ impl Shard for LockstepShard {
         if self.agents.start + block > 0 {
             return Ok(bytes);
         }
-        let loaded = self.meeting.enter().crowd.load(bytes);
+        let loaded = self.barrier.enter().task.load(bytes);
         loaded.map_err(|error| match error.downcast::<EnvError>() {
             Ok(error) => *error,
             Err(error) => EnvError::Snapshot(error.to_string()),

@@ -4,7 +4,7 @@
 //! - [`VecEnv`] is the general interface: any number of agents, plain row-major arrays, threads, automatic resets.
 //! - [`Agent`] is the trait to implement for a new creature or task; [`register`] adds it by name. [`Options`] are an
 //!   agent's named arguments.
-//! - [`Lockstep`] returns the blocks of a [`Crowd`]: an external task whose agents are stepped all at once.
+//! - [`BatchAdapter`] returns the blocks of a [`BatchTask`]: an external task whose agents are stepped all at once.
 //!
 //! Modules from bottom to top, each importing only from those before it: `error`, `episode_rng`; `agent` (the trait);
 //! `shard` (the learner's interface); `lanes` (runs agents); `any_agent` (agents as trait objects); `agents` (the
@@ -40,10 +40,10 @@ pub use agent::{
     OptionInfo, Options, Part, ResetNoise, RoleFacts, Senses, Sigmoid, Site, Start, Terms, Tolerance, Value, View,
     memory, names, options, senses, tolerance,
 };
-pub use any_agent::{AnyAgent, Elsewhere};
+pub use any_agent::{AnyAgent, WithModel};
 pub use episode_rng::EpisodeRng;
 pub use error::EnvError;
-pub use external::{Crowd, CrowdError, CrowdFailed, Lockstep};
+pub use external::{BatchAdapter, BatchTask, BatchTaskError, BatchTaskFailed};
 pub use lanes::TERMINATION_TERM;
 pub use registry::{Registry, agent, factory, factory_with, ids, register};
 pub use shard::{

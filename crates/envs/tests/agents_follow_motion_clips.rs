@@ -424,7 +424,7 @@ fn two_clips_of_one_name_are_followed_side_by_side() {
         let mut out = env.buffers();
         env.reset(Some(4), &mut out.obs).unwrap();
         let action = vec![0.2; 2 * env.spec().act];
-        (0..20).for_each(|_| env.step(&action, &mut out.as_mut()).unwrap());
+        (0..20).for_each(|_| env.step(&action, &mut out).unwrap());
         out.obs
     };
     let own = |clip: &str| played(&mut follow(&Options::new().with("clip", clip).with("start", "first"), 2, None));

@@ -6,7 +6,7 @@
 //!
 //! * [`train`] trains a policy for the task of a [`ShardFactory`](marathon_envs::ShardFactory). [`TrainConfig`] holds
 //!   the settings, its [`Algorithm`] the method. An [`Observer`] follows the run and may stop it.
-//! * [`Trainer`] is the same run, one iteration per call.
+//! * [`TrainLoop`] is the same run, one iteration per call.
 //! * [`train_with`] lets others play the rollouts, such as [`Player`]s on other machines.
 //! * [`Policy`] is the result. It acts, and you can save it to a file. [`evaluate`] measures it.
 //! * [`Checkpoint`] is an interrupted run. When resumed, it gives the same bits as an uninterrupted run.
@@ -91,4 +91,4 @@ pub use trainer::memory::can_be_had;
 pub use trainer::observer::{Control, Observer, Snapshot};
 pub use trainer::remote::{Deliver, Player, Players};
 pub use trainer::stats::{IterationStats, Learned};
-pub use trainer::{TrainOutput, Trainer, train, train_with};
+pub use trainer::{TrainLoop, TrainOutput, train, train_with};

@@ -4,7 +4,7 @@
 mod common;
 
 use common::{PuckTask, silent, small_config, small_of};
-use marathon_learn::{Control, IterationStats, Snapshot, Trainer, train};
+use marathon_learn::{Control, IterationStats, Snapshot, TrainLoop, train};
 use marathon_physics::lanes::Isa;
 
 /// The values that do not depend on time.
@@ -25,7 +25,7 @@ fn steps_are_those_of_train() {
             };
             let task = PuckTask::with_limit(20);
             let output = train(&task, Isa::best(), &config, None, &mut observer).unwrap();
-            let mut trainer = Trainer::new(&task, Isa::best(), &config).unwrap();
+            let mut trainer = TrainLoop::new(&task, Isa::best(), &config).unwrap();
             assert_eq!(trainer.config(), &config);
             let mut made = Vec::new();
             for policy in &policies {
@@ -44,12 +44,12 @@ fn steps_are_those_of_train() {
 #[test]
 fn a_run_may_be_left() {
     let config = small_config().with(|config| config.run.threads = 3);
-    drop(Trainer::new(&PuckTask::new(), Isa::best(), &config).unwrap());
-    let mut trainer = Trainer::new(&PuckTask::new(), Isa::best(), &config).unwrap();
+    drop(TrainLoop::new(&PuckTask::new(), Isa::best(), &config).unwrap());
+    let mut trainer = TrainLoop::new(&PuckTask::new(), Isa::best(), &config).unwrap();
     trainer.iterate().unwrap();
     let checkpoint = trainer.checkpoint();
     drop(trainer);
-    let mut resumed = Trainer::resume(&PuckTask::new(), Isa::best(), &config, checkpoint).unwrap();
+    let mut resumed = TrainLoop::resume(&PuckTask::new(), Isa::best(), &config, checkpoint).unwrap();
     while !resumed.is_done() {
         resumed.iterate().unwrap();
     }

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{PuckTask, small_of};
-use marathon_learn::{BLOCK, Init, Trainer};
+use marathon_learn::{BLOCK, Init, TrainLoop};
 use marathon_physics::lanes::Isa;
 use safetensors::SafeTensors;
 
@@ -13,7 +13,7 @@ fn parameters(initialization: Init) -> Vec<f64> {
         config.network.initialization = initialization;
         (config.network.hidden, config.network.critic_hidden) = (vec![8], Some(vec![400]));
     });
-    let trainer = Trainer::new(&PuckTask::new(), Isa::best(), &config).unwrap();
+    let trainer = TrainLoop::new(&PuckTask::new(), Isa::best(), &config).unwrap();
     let folder = tempfile::tempdir().unwrap();
     trainer.checkpoint().save(folder.path()).unwrap();
     let files = std::fs::read_dir(folder.path()).unwrap().map(|file| file.unwrap().path());

@@ -5,8 +5,8 @@
 //! Nothing here knows of Gymnasium or another framework.
 
 mod arrays;
+mod batch_task;
 mod clip;
-mod crowd;
 mod error;
 mod model;
 mod number;

@@ -2,7 +2,7 @@
 
 use crate::arrays::tuple;
 use crate::task::{self, Task};
-use crate::{crowd, error, number, options as arguments};
+use crate::{batch_task, error, number, options as arguments};
 use marathon_envs::BLOCK;
 use marathon_learn::{BlockPolicy, EvalOptions, evaluate as play};
 use marathon_physics::lanes::Isa;
@@ -137,8 +137,8 @@ pub fn evaluate<'py>(
     let result = match &task {
         Some(Task::Agent(agent)) => {
             let agents = episodes.clamp(1, MOST_AGENTS).next_multiple_of(BLOCK);
-            let crowd = task::lockstep(agent.bind(py), agents, threads)?;
-            crowd::run(py, Some(&crowd), || play(&crowd, Isa::best(), &policy.0, &options))?
+            let batch_task = task::lockstep(agent.bind(py), agents, threads)?;
+            batch_task::run(py, Some(&batch_task), || play(&batch_task, Isa::best(), &policy.0, &options))?
         }
         other => {
             let name = if let Some(Task::Name(name)) = other { task::plain(name) } else { policy.task() };

@@ -1,7 +1,7 @@
 //! What stands for a task in Python: its name, or an agent that is written in Python.
 
-use crate::{crowd, error};
-use marathon_envs::{Lockstep, ShardFactory, Spec, registry};
+use crate::{batch_task, error};
+use marathon_envs::{BatchAdapter, ShardFactory, Spec, registry};
 use marathon_physics::lanes::Isa;
 use marathon_runs::RunError;
 use pyo3::exceptions::PyTypeError;
@@ -31,8 +31,8 @@ pub fn plain(name: &str) -> &str {
 /// What became of an agent that a run was begun with.
 #[derive(Default)]
 pub struct Made {
-    pub crowd: Option<Arc<Lockstep>>,
-    /// Why there is no crowd.
+    pub batch_task: Option<Arc<BatchAdapter>>,
+    /// Why there is no batch_task.
     pub error: Option<PyErr>,
 }
 
@@ -41,11 +41,11 @@ impl Task {
     pub fn spec(&self, py: Python<'_>) -> PyResult<Spec> {
         match self {
             Task::Name(name) => Ok(registry::factory(plain(name), Isa::best()).map_err(error::env)?.spec().clone()),
-            Task::Agent(agent) => crowd::spec(&vec_env(agent.bind(py), 1, 1)?),
+            Task::Agent(agent) => batch_task::spec(&vec_env(agent.bind(py), 1, 1)?),
         }
     }
 
-    /// The task of a run; `made` learns of a crowd that is made for it.
+    /// The task of a run; `made` learns of a batch_task that is made for it.
     pub fn of_run<'a>(
         &'a self,
         py: Python<'a>,
@@ -60,10 +60,10 @@ impl Task {
         let id: String = agent.call_method0("task_id")?.extract()?;
         let text = id.clone();
         Ok(marathon_runs::Task::made(id, move |agents| match lockstep(agent, agents, threads) {
-            Ok(crowd) => {
-                let crowd = Arc::new(crowd);
-                made.crowd = Some(crowd.clone());
-                Ok(crowd as Arc<dyn ShardFactory>)
+            Ok(batch_task) => {
+                let batch_task = Arc::new(batch_task);
+                made.batch_task = Some(batch_task.clone());
+                Ok(batch_task as Arc<dyn ShardFactory>)
             }
             Err(error) => {
                 made.error = Some(error);
@@ -74,8 +74,8 @@ impl Task {
 }
 
 /// So many agents of a kind, for the trainer.
-pub fn lockstep(agent: &Bound<'_, PyAny>, agents: usize, threads: usize) -> PyResult<Lockstep> {
-    crowd::lockstep(&vec_env(agent, agents, threads)?)
+pub fn lockstep(agent: &Bound<'_, PyAny>, agents: usize, threads: usize) -> PyResult<BatchAdapter> {
+    batch_task::lockstep(&vec_env(agent, agents, threads)?)
 }
 
 fn vec_env<'py>(agent: &Bound<'py, PyAny>, agents: usize, threads: usize) -> PyResult<Bound<'py, PyAny>> {

@@ -3,7 +3,7 @@
 use crate::players::PyPlayers;
 use crate::policy::{Policy, json};
 use crate::task::{self, Made, Task};
-use crate::{crowd, error, number, options as arguments};
+use crate::{batch_task, error, number, options as arguments};
 use marathon_learn::{Control, Players};
 use marathon_runs::report::csv::columns;
 use marathon_runs::{LearnOptions, RunError, RunOptions, Session};
@@ -145,7 +145,7 @@ pub fn train(
     let mut players = players.map(|object| PyPlayers::begin(py, object, &session.setting, &run.config)).transpose()?;
     let mut failure: Option<PyErr> = None;
     let mut last = (session.steps(), 0.0);
-    let result = crowd::run(py, made.crowd.as_deref(), || {
+    let result = batch_task::run(py, made.batch_task.as_deref(), || {
         let players = players.as_mut().map(|players| players as &mut dyn Players);
         session.carry_out_with(players, false, &mut |stats| {
             let (steps, wall) = std::mem::replace(&mut last, (stats.steps, stats.wall_seconds));
@@ -157,7 +157,7 @@ pub fn train(
                 for (name, value) in columns(stats, rate, &terms) {
                     metrics.set_item(name, value)?;
                 }
-                Ok(crowd::goes_on(&callback.bind(py).call1((metrics,))?))
+                Ok(batch_task::goes_on(&callback.bind(py).call1((metrics,))?))
             };
             match Python::attach(ask) {
                 Ok(true) => Control::Continue,

@@ -30,7 +30,7 @@ pub mod task;
 pub mod terminal;
 pub mod text;
 
-pub use controller::Obedience;
+pub use controller::CommandTracking;
 pub use error::{Flags, Plain, RunError, Spelling};
 pub use folder::{RunFile, RunFolder};
 pub use imitation::Imitation;

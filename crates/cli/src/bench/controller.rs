@@ -4,7 +4,7 @@ use super::options::Head;
 use crate::error::CliError;
 use marathon_learn::EvalOptions;
 use marathon_runs::terminal::{print_json, say};
-use marathon_runs::{Obedience, PolicySource, controller, output};
+use marathon_runs::{CommandTracking, PolicySource, controller, output};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -33,7 +33,7 @@ struct Document<'a> {
     #[serde(flatten)]
     head: Head,
     #[serde(flatten)]
-    obedience: &'a Obedience,
+    obedience: &'a CommandTracking,
 }
 
 /// Runs the trials.

@@ -11,12 +11,12 @@ pub(crate) struct Commands<T: Real> {
     /// Commands that they observe at the end of the present decision.
     pub next: Vec<T>,
     /// Sources of the commands, by lane.
-    told: Vec<Told>,
+    told: Vec<CommandState>,
 }
 
 /// Sources of an agent's command.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Told {
+pub(crate) struct CommandState {
     /// The command of the agent's schedule.
     scheduled: Vec<f64>,
     /// Number of the observation for which the schedule draws the next command.
@@ -29,14 +29,14 @@ pub(crate) struct Told {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SavedCommand {
     present: Vec<f64>,
-    told: Told,
+    told: CommandState,
 }
 
 impl<T: Real> Commands<T> {
     /// Commands at rest in these ranges.
     pub fn new(ranges: &[CommandRange]) -> Self {
         let n = ranges.len();
-        let told = Told { scheduled: idle(ranges), due: 0, given: None };
+        let told = CommandState { scheduled: idle(ranges), due: 0, given: None };
         Commands { present: vec![T::zero(); n], next: vec![T::zero(); n], told: vec![told; T::LANES] }
     }
 
@@ -104,7 +104,7 @@ impl SavedCommand {
         if self.present.is_empty() {
             return;
         }
-        let Told { scheduled, due, given } = &self.told;
+        let CommandState { scheduled, due, given } = &self.told;
         bytes.push(u8::from(given.is_some()));
         bytes.extend(due.to_le_bytes());
         let numbers = self.present.iter().chain(scheduled).chain(given.iter().flatten());
@@ -114,7 +114,7 @@ impl SavedCommand {
     /// Reads a command of `n` numbers.
     pub fn read_from(n: usize, bytes: &mut &[u8]) -> Option<Self> {
         if n == 0 {
-            return Some(SavedCommand { present: Vec::new(), told: Told::default() });
+            return Some(SavedCommand { present: Vec::new(), told: CommandState::default() });
         }
         let (&[flag], rest) = bytes.split_first_chunk()?;
         let (due, rest) = rest.split_first_chunk()?;
@@ -126,7 +126,7 @@ impl SavedCommand {
             1 => Some(next()?),
             _ => return None,
         };
-        Some(SavedCommand { present, told: Told { scheduled, due: u64::from_le_bytes(*due), given } })
+        Some(SavedCommand { present, told: CommandState { scheduled, due: u64::from_le_bytes(*due), given } })
     }
 }
 

@@ -70,7 +70,7 @@ pub trait Shard: Send {
     /// lanes are unchanged.
     fn reset(&mut self, block: usize, mask: u16, obs: &mut [f32]);
     /// Passes the actions of all blocks, `[block][act][16]`, before the [`Shard::step`] of each block. Only tasks that
-    /// step all agents at once need it, such as those of [`Lockstep`](crate::Lockstep).
+    /// step all agents at once need it, such as those of [`BatchAdapter`](crate::BatchAdapter).
     fn announce(&mut self, actions: &[f32]) {
         let _ = actions;
     }
@@ -102,7 +102,7 @@ pub trait ShardFactory: Send + Sync {
     fn spec(&self) -> &Spec;
     /// A shard of blocks `first .. first + blocks`, all agents before their first reset.
     fn shard(&self, first: usize, blocks: usize, seed: u64) -> Box<dyn Shard>;
-    /// Number of agents, if they can only be stepped all at once, as in [`Lockstep`](crate::Lockstep). The shards in
+    /// Number of agents, if they can only be stepped all at once, as in [`BatchAdapter`](crate::BatchAdapter). The shards in
     /// use must then cover all blocks. `None` if the number of agents is free.
     fn lockstep(&self) -> Option<usize> {
         None

@@ -12,9 +12,9 @@
 
 use super::actor_critic::{self, ActionStd, ActorCritic, Layout, refuse_adaptive};
 use super::loss::{LossSums, Objective};
-use super::on_policy::{OnPolicy, Rule, Student};
+use super::on_policy::{OnPolicy, OnPolicyState, UpdateRule};
 use super::schedule::{LrSchedule, Progress, Schedule};
-use super::{Common, Needs, Saved, Setup, Workers, check};
+use super::{MemoryPlan, Saved, Setup, SharedConfig, Workers, check};
 use crate::error::Error;
 use crate::nets::gaussian::Ratio;
 use crate::optim::rmsprop::RmsProp;
@@ -74,7 +74,7 @@ impl A2c {
     ///
     /// # Errors
     /// Names the field, its value and the values that are valid.
-    pub fn validate(&self, _: &Common<'_>) -> Result<(), Error> {
+    pub fn validate(&self, _: &SharedConfig<'_>) -> Result<(), Error> {
         check::positive(&[
             ("value_coef", self.value_coef),
             ("rms_epsilon", self.rms_epsilon),
@@ -88,8 +88,8 @@ impl A2c {
     }
 
     /// Memory that a run needs.
-    pub(super) fn needs(&self, setup: &Setup<'_>) -> Needs {
-        Layout::new(setup, Ratio::Joint).needs(setup.common.items(), 0)
+    pub(super) fn memory_plan(&self, setup: &Setup<'_>) -> MemoryPlan {
+        Layout::new(setup, Ratio::Joint).memory_plan(setup.common.items(), 0)
     }
 }
 
@@ -120,8 +120,8 @@ impl A2cRule {
         OnPolicy::new(nets, settings.lr, 0, Self { settings, rms })
     }
 
-    fn step(&mut self, student: &mut Student, workers: &dyn Workers, progress: &Progress, sums: &LossSums) {
-        let (Self { settings, rms }, Student { nets, lr, skipped, .. }) = (self, student);
+    fn step(&mut self, on_policy: &mut OnPolicyState, workers: &dyn Workers, progress: &Progress, sums: &LossSums) {
+        let (Self { settings, rms }, OnPolicyState { nets, lr, skipped, .. }) = (self, on_policy);
         // no agent acted in this batch
         if sums.samples == 0.0 {
             return;
@@ -145,19 +145,19 @@ impl A2cRule {
     }
 }
 
-impl Rule for A2cRule {
+impl UpdateRule for A2cRule {
     fn learn(
         &mut self,
-        student: &mut Student,
+        on_policy: &mut OnPolicyState,
         workers: &mut dyn Workers,
         experience: &Experience<'_>,
         progress: &Progress,
     ) -> LossSums {
         let items: Vec<u32> = (0..experience.items() as u32).collect();
         let objective = objective(progress.at(self.settings.entropy_coef));
-        let sums = student.gradient(workers, experience, &items, objective, None);
-        student.lr = self.settings.lr * progress.rate(self.settings.lr_schedule);
-        self.step(student, workers, progress, &sums);
+        let sums = on_policy.gradient(workers, experience, &items, objective, None);
+        on_policy.lr = self.settings.lr * progress.rate(self.settings.lr_schedule);
+        self.step(on_policy, workers, progress, &sums);
         sums
     }
 

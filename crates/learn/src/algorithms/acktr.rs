@@ -19,9 +19,9 @@
 use super::a2c;
 use super::actor_critic::{self, ActionStd, ActorCritic, Layout, refuse_adaptive};
 use super::loss::LossSums;
-use super::on_policy::{OnPolicy, Rule, Student};
+use super::on_policy::{OnPolicy, OnPolicyState, UpdateRule};
 use super::schedule::{LrSchedule, Progress, Schedule};
-use super::{Common, Needs, Saved, Setup, Workers, check};
+use super::{MemoryPlan, Saved, Setup, SharedConfig, Workers, check};
 use crate::error::Error;
 use crate::nets::gaussian::Ratio;
 use crate::optim::kfac::Kfac;
@@ -84,7 +84,7 @@ impl Acktr {
     ///
     /// # Errors
     /// Names the field, its value and the values that are valid.
-    pub fn validate(&self, common: &Common<'_>) -> Result<(), Error> {
+    pub fn validate(&self, common: &SharedConfig<'_>) -> Result<(), Error> {
         check::positive(&[
             ("value_coef", self.value_coef),
             ("kl_clip", self.kl_clip),
@@ -110,9 +110,9 @@ impl Acktr {
     }
 
     /// Memory that a run needs.
-    pub(super) fn needs(&self, setup: &Setup<'_>) -> Needs {
+    pub(super) fn memory_plan(&self, setup: &Setup<'_>) -> MemoryPlan {
         let layout = Layout::new(setup, Ratio::Joint);
-        layout.needs(setup.common.items(), Kfac::moments_len(&layout.actor, &layout.critic))
+        layout.memory_plan(setup.common.items(), Kfac::moments_len(&layout.actor, &layout.critic))
     }
 }
 
@@ -136,9 +136,9 @@ impl AcktrRule {
     }
 
     /// Takes a step on the worker's replica.
-    fn step(&mut self, student: &mut Student, progress: &Progress, scale: [f64; 2], sums: &mut LossSums) {
+    fn step(&mut self, on_policy: &mut OnPolicyState, progress: &Progress, scale: [f64; 2], sums: &mut LossSums) {
         let Self { settings, kfac, momentum } = self;
-        let Student { nets, lr, skipped, space: Some(space), .. } = student else { return };
+        let OnPolicyState { nets, lr, skipped, space: Some(space), .. } = on_policy else { return };
         let gradient = &space.gradient;
         let log_std = nets.layout.log_std.clone();
         let of_std = |i: usize| gradient[i] as f64 * scale[0] / (2.0 + settings.damping);
@@ -171,10 +171,10 @@ impl AcktrRule {
     }
 }
 
-impl Rule for AcktrRule {
+impl UpdateRule for AcktrRule {
     fn learn(
         &mut self,
-        student: &mut Student,
+        on_policy: &mut OnPolicyState,
         workers: &mut dyn Workers,
         experience: &Experience<'_>,
         progress: &Progress,
@@ -182,11 +182,11 @@ impl Rule for AcktrRule {
         let Self { settings, kfac, .. } = self;
         let items: Vec<u32> = (0..experience.items() as u32).collect();
         let objective = a2c::objective(progress.at(settings.entropy_coef));
-        let mut sums = student.gradient(workers, experience, &items, objective, Some(kfac));
+        let mut sums = on_policy.gradient(workers, experience, &items, objective, Some(kfac));
         let mean = 1.0 / sums.samples;
         // the available gradient is that of (V - R)^2 / 2
         let scale = [mean, mean * 2.0 * settings.value_coef];
-        let Student { nets, space: Some(space), .. } = &mut *student else { return sums };
+        let OnPolicyState { nets, space: Some(space), .. } = &mut *on_policy else { return sums };
         let gradient = &mut space.gradient;
         workers.pieces(&mut |_, range, piece| gradient[range].copy_from_slice(piece));
 
@@ -204,8 +204,8 @@ impl Rule for AcktrRule {
             let scale = scale[layer.network];
             layer.natural(nets.isa, gradient, scale);
         });
-        student.lr = settings.lr * progress.rate(settings.lr_schedule);
-        self.step(student, progress, scale, &mut sums);
+        on_policy.lr = settings.lr * progress.rate(settings.lr_schedule);
+        self.step(on_policy, progress, scale, &mut sums);
         workers.wait();
         sums
     }

@@ -4,7 +4,7 @@
 use super::loss::{Loss, LossSums, Objective};
 use super::parameters::Places;
 use super::schedule::{LrSchedule, Progress, Schedule};
-use super::{Description, Needs, Partial, Setup, Workers, check};
+use super::{Description, MemoryPlan, Partial, Setup, Workers, check};
 use crate::error::Error;
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Blocks;
@@ -17,7 +17,7 @@ use crate::nets::normalize::Normalizer;
 use crate::optim::kfac::Kfac;
 use crate::optim::sum;
 use crate::policy::{Policy, PolicyMeta};
-use crate::rewards::{Judge, Lesson, Stream};
+use crate::rewards::{Minibatch, RewardModel, Stream};
 use crate::rollout::context::{RolloutContext, Values};
 use crate::rollout::data::{Experience, Samples, Shape};
 use crate::rollout::statistics::Statistics;
@@ -132,8 +132,8 @@ impl Layout {
     }
 
     /// Memory that a run needs. `items` is the length of the longest list of samples.
-    pub fn needs(&self, items: usize, moments: usize) -> Needs {
-        Needs { parameters: self.places.total(), moments, items, shape: self.shape, replay: 0 }
+    pub fn memory_plan(&self, items: usize, moments: usize) -> MemoryPlan {
+        MemoryPlan { parameters: self.places.total(), moments, items, shape: self.shape, replay: 0 }
     }
 
     /// Learning rates of all networks: policy, value function, rewards.
@@ -219,13 +219,13 @@ impl ActorCritic {
         experience: &Experience<'_>,
         items: &[u32],
         objective: Objective,
-        (kfac, lesson): (Option<&Kfac>, Lesson<'_>),
+        (kfac, minibatch): (Option<&Kfac>, Minibatch<'_>),
         space: &mut Space,
     ) -> LossSums {
         let gaussian = self.gaussian();
         workers.share_out(items.len(), &mut |group, partial| {
-            let lesson = Lesson { items: &items[group], ..lesson };
-            self.gradient_of_group(&gaussian, objective, experience, (kfac, lesson), space, partial);
+            let minibatch = Minibatch { items: &items[group], ..minibatch };
+            self.gradient_of_group(&gaussian, objective, experience, (kfac, minibatch), space, partial);
         })
     }
 
@@ -235,14 +235,14 @@ impl ActorCritic {
         gaussian: &Gaussian<f32>,
         objective: Objective,
         experience: &Experience<'_>,
-        (kfac, lesson): (Option<&Kfac>, Lesson<'_>),
+        (kfac, minibatch): (Option<&Kfac>, Minibatch<'_>),
         space: &mut Space,
         partial: &mut Partial,
     ) {
         let (layout, isa) = (&self.layout, self.isa);
         let (actor, critic) = (self.actor_params(), self.critic_params());
         partial.sums = LossSums::default();
-        for (i, chunk) in lesson.items.chunks(CHUNK).enumerate() {
+        for (i, chunk) in minibatch.items.chunks(CHUNK).enumerate() {
             let mut samples =
                 [Samples { decided: 0, action: &[], log_prob: &[], advantage: &[], value: &[], target: &[] }; CHUNK];
             let (mut n, mut steps) = (0, Vec::new());
@@ -259,8 +259,8 @@ impl ActorCritic {
             let networks = layout.streams.iter().filter_map(|stream| stream.networks.as_ref());
             for (networks, judge) in networks.zip(&mut space.judges) {
                 let place = networks.place.clone();
-                let lesson = Lesson { items: chunk, ..lesson };
-                judge.gradient(isa, &self.params[place.clone()], &steps, &lesson, &mut gradient[place]);
+                let minibatch = Minibatch { items: chunk, ..minibatch };
+                judge.gradient(isa, &self.params[place.clone()], &steps, &minibatch, &mut gradient[place]);
             }
             let (of_actor, of_critic) = gradient.split_at_mut(layout.critic_start);
             let (of_net, of_std) = of_actor.split_at_mut(layout.actor.len());
@@ -341,7 +341,7 @@ pub struct Space {
     input: Blocks<f32>,
     actor: Tape<f32>,
     critic: Tape<f32>,
-    judges: Vec<Box<dyn Judge>>,
+    judges: Vec<Box<dyn RewardModel>>,
     /// Gradient of all parameters.
     pub gradient: Vec<f32>,
     moments: Vec<f32>,
@@ -356,7 +356,7 @@ impl Space {
             input: layout.actor.input(),
             actor: layout.actor.tape(),
             critic: layout.critic.tape(),
-            judges: networks.map(|networks| networks.reward.judge()).collect(),
+            judges: networks.map(|networks| networks.reward.reward_model()).collect(),
             gradient: vec![0.0; layout.places.total()],
             moments: vec![0.0; moments],
             rows: vec![[0.0; BLOCK]; layout.shape.act],

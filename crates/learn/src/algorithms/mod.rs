@@ -64,7 +64,7 @@ pub struct Setup<'a> {
     /// Instruction set.
     pub isa: Isa,
     /// Settings.
-    pub common: Common<'a>,
+    pub common: SharedConfig<'a>,
     /// Bound of the sampled actions, which are then divided by it.
     pub action_clip: f64,
     /// Demonstrations to imitate, if this process has them.
@@ -81,7 +81,7 @@ impl<'a> Setup<'a> {
 
 /// Settings of a run that are not specific to the algorithm but visible to it.
 #[derive(Clone, Copy)]
-pub struct Common<'a> {
+pub struct SharedConfig<'a> {
     /// Networks.
     pub network: &'a NetworkConfig,
     /// Reward signals.
@@ -96,7 +96,7 @@ pub struct Common<'a> {
     pub seed: u64,
 }
 
-impl Common<'_> {
+impl SharedConfig<'_> {
     /// Agents per block.
     pub fn lanes(&self) -> usize {
         self.agents.min(BLOCK)
@@ -112,7 +112,7 @@ impl Common<'_> {
 }
 
 /// Memory that a run with an algorithm needs.
-pub struct Needs {
+pub struct MemoryPlan {
     /// Number of parameters.
     pub parameters: usize,
     /// Numbers that a group of samples contributes besides the gradient.
@@ -153,7 +153,7 @@ impl Algorithm {
     ///
     /// # Errors
     /// Names the setting, its value and the values that are valid.
-    pub fn validate(&self, common: &Common<'_>) -> Result<(), Error> {
+    pub fn validate(&self, common: &SharedConfig<'_>) -> Result<(), Error> {
         match self {
             Algorithm::Ppo(settings) => settings.validate(common),
             Algorithm::A2c(settings) => settings.validate(common),
@@ -163,12 +163,12 @@ impl Algorithm {
     }
 
     /// Memory that a run needs.
-    pub fn needs(&self, setup: &Setup<'_>) -> Needs {
+    pub fn memory_plan(&self, setup: &Setup<'_>) -> MemoryPlan {
         match self {
-            Algorithm::Ppo(settings) => settings.needs(setup),
-            Algorithm::A2c(settings) => settings.needs(setup),
-            Algorithm::Acktr(settings) => settings.needs(setup),
-            Algorithm::Sac(settings) => settings.needs(setup),
+            Algorithm::Ppo(settings) => settings.memory_plan(setup),
+            Algorithm::A2c(settings) => settings.memory_plan(setup),
+            Algorithm::Acktr(settings) => settings.memory_plan(setup),
+            Algorithm::Sac(settings) => settings.memory_plan(setup),
         }
     }
 
@@ -348,7 +348,7 @@ pub(crate) mod check {
         }
     }
     /// Refuses rewards other than the task's.
-    pub fn task_alone(common: &Common<'_>, name: &str) -> Result<(), Error> {
+    pub fn task_alone(common: &SharedConfig<'_>, name: &str) -> Result<(), Error> {
         match common.rewards.iter().find(|reward| reward.kind != RewardKind::Task) {
             Some(reward) => {
                 let expected = format!("the task's alone with {name}; ppo and a2c take others");

@@ -9,14 +9,14 @@ use crate::error::Error;
 use crate::nets::normalize::Normalizer;
 use crate::optim::kfac::Kfac;
 use crate::policy::{Policy, PolicyMeta};
-use crate::rewards::Lesson;
+use crate::rewards::Minibatch;
 use crate::rollout::context::RolloutContext;
 use crate::rollout::data::{Experience, Shape};
 use crate::rollout::statistics::Statistics;
 use crate::rollout::sums::Totals;
 
 /// Networks and the progress of their training.
-pub struct Student {
+pub struct OnPolicyState {
     /// The networks.
     pub nets: ActorCritic,
     /// Learning rate of the policy.
@@ -33,7 +33,7 @@ pub struct Student {
     batches: u64,
 }
 
-impl Student {
+impl OnPolicyState {
     /// Leaves the gradient of an objective on a list of items with the workers, see [`ActorCritic::gradient`].
     pub fn gradient(
         &mut self,
@@ -45,18 +45,18 @@ impl Student {
     ) -> LossSums {
         let Self { nets, moments, space, normalizer, batches, .. } = self;
         let space = space.get_or_insert_with(|| Box::new(Space::new(&nets.layout, *moments)));
-        let lesson = Lesson { normalizer, batch: *batches, items };
+        let minibatch = Minibatch { normalizer, batch: *batches, items };
         *batches += 1;
-        nets.gradient(workers, experience, items, objective, (kfac, lesson), space)
+        nets.gradient(workers, experience, items, objective, (kfac, minibatch), space)
     }
 }
 
 /// An update rule: an algorithm with its settings and the state of its optimizer.
-pub trait Rule: Clone + Send + 'static {
+pub trait UpdateRule: Clone + Send + 'static {
     /// Learns from a rollout together with all other workers. Returns the sums of the objective.
     fn learn(
         &mut self,
-        student: &mut Student,
+        on_policy: &mut OnPolicyState,
         workers: &mut dyn Workers,
         experience: &Experience<'_>,
         progress: &Progress,
@@ -69,63 +69,63 @@ pub trait Rule: Clone + Send + 'static {
 
 /// An on-policy [`Learner`].
 pub struct OnPolicy<R> {
-    student: Student,
+    on_policy: OnPolicyState,
     rule: R,
 }
 
-impl<R: Rule> OnPolicy<R> {
+impl<R: UpdateRule> OnPolicy<R> {
     /// Creates a learner at the start of a run. Each group of samples contributes `moments` numbers besides its
     /// gradient.
     pub fn new(nets: ActorCritic, lr: f64, moments: usize, rule: R) -> Self {
         let normalizer = Normalizer::identity(0, 1.0);
-        Self { student: Student { nets, lr, skipped: 0, moments, space: None, normalizer, batches: 0 }, rule }
+        Self { on_policy: OnPolicyState { nets, lr, skipped: 0, moments, space: None, normalizer, batches: 0 }, rule }
     }
 }
 
-impl<R: Rule> Learner for OnPolicy<R> {
+impl<R: UpdateRule> Learner for OnPolicy<R> {
     fn update(&mut self, workers: &mut dyn Workers, experience: &Experience<'_>, now: Now<'_>, sums: &mut LossSums) {
         // the first rollout only fills the statistics
         if now.progress.iteration > 0 {
             // counting from the rollout's number makes a resumed run draw the same numbers
-            self.student.batches = now.progress.iteration << 32;
-            self.student.normalizer = now.statistics.normalizer();
-            *sums += self.rule.learn(&mut self.student, workers, experience, now.progress);
+            self.on_policy.batches = now.progress.iteration << 32;
+            self.on_policy.normalizer = now.statistics.normalizer();
+            *sums += self.rule.learn(&mut self.on_policy, workers, experience, now.progress);
         }
     }
     fn replica(&self) -> Box<dyn Learner> {
-        let Student { nets, lr, skipped, moments, normalizer, batches, .. } = &self.student;
+        let OnPolicyState { nets, lr, skipped, moments, normalizer, batches, .. } = &self.on_policy;
         let (nets, normalizer) = (nets.clone(), normalizer.clone());
         let (lr, skipped, moments, batches) = (*lr, *skipped, *moments, *batches);
-        let student = Student { nets, lr, skipped, moments, space: None, normalizer, batches };
-        Box::new(Self { student, rule: self.rule.clone() })
+        let on_policy = OnPolicyState { nets, lr, skipped, moments, space: None, normalizer, batches };
+        Box::new(Self { on_policy, rule: self.rule.clone() })
     }
     fn places(&self) -> &Places {
-        &self.student.nets.layout.places
+        &self.on_policy.nets.layout.places
     }
     fn params(&self) -> &[f32] {
-        &self.student.nets.params
+        &self.on_policy.nets.params
     }
     fn params_mut(&mut self) -> &mut Vec<f32> {
-        &mut self.student.nets.params
+        &mut self.on_policy.nets.params
     }
     fn shape(&self) -> Shape {
-        self.student.nets.shape()
+        self.on_policy.nets.shape()
     }
     fn collecting(&self, statistics: &Statistics) -> RolloutContext<'_> {
-        self.student.nets.collecting(statistics)
+        self.on_policy.nets.collecting(statistics)
     }
     fn follow(&mut self, before: &Normalizer, after: &Normalizer) {
-        self.student.nets.follow(before, after);
+        self.on_policy.nets.follow(before, after);
     }
     fn describe(&self, totals: &Totals, _: &LossSums) -> Description {
-        let Student { nets, lr, skipped, .. } = &self.student;
+        let OnPolicyState { nets, lr, skipped, .. } = &self.on_policy;
         nets.describe(totals, *lr, *skipped)
     }
     fn policy(&self, meta: PolicyMeta, normalizer: Normalizer) -> Policy {
-        self.student.nets.policy(meta, normalizer)
+        self.on_policy.nets.policy(meta, normalizer)
     }
     fn save(&self) -> Saved {
-        let (mut saved, Student { nets, lr, skipped, .. }) = (Saved::default(), &self.student);
+        let (mut saved, OnPolicyState { nets, lr, skipped, .. }) = (Saved::default(), &self.on_policy);
         saved.list("params", &nets.params);
         self.rule.save(&mut saved);
         saved.scalar("lr", *lr);
@@ -133,9 +133,9 @@ impl<R: Rule> Learner for OnPolicy<R> {
         saved
     }
     fn load(&mut self, saved: &Saved) -> Result<(), Error> {
-        saved.copy("params", &mut self.student.nets.params)?;
+        saved.copy("params", &mut self.on_policy.nets.params)?;
         self.rule.load(saved)?;
-        (self.student.lr, self.student.skipped) = (saved.number("lr")?, saved.number("skipped")? as u64);
+        (self.on_policy.lr, self.on_policy.skipped) = (saved.number("lr")?, saved.number("skipped")? as u64);
         Ok(())
     }
 }

@@ -5,9 +5,9 @@
 
 use super::actor_critic::{self, ActionStd, ActorCritic, Layout};
 use super::loss::{LossSums, Objective};
-use super::on_policy::{OnPolicy, Rule, Student};
+use super::on_policy::{OnPolicy, OnPolicyState, UpdateRule};
 use super::schedule::{LrSchedule, Progress, Schedule};
-use super::{Common, Needs, Saved, Setup, Workers, check, load_adam, save_adam, share};
+use super::{MemoryPlan, Saved, Setup, SharedConfig, Workers, check, load_adam, save_adam, share};
 use crate::error::Error;
 use crate::lanes::noise::{SHUFFLES, SplitMix};
 use crate::nets::gaussian::Ratio;
@@ -88,7 +88,7 @@ impl Ppo {
     ///
     /// # Errors
     /// Names the field, its value and the values that are valid.
-    pub fn validate(&self, common: &Common<'_>) -> Result<(), Error> {
+    pub fn validate(&self, common: &SharedConfig<'_>) -> Result<(), Error> {
         for (field, n) in [("minibatches", self.minibatches), ("epochs", self.epochs)] {
             if n == 0 {
                 return Err(Error::config(field, n, "at least 1"));
@@ -122,8 +122,8 @@ impl Ppo {
     }
 
     /// Memory that a run needs.
-    pub(super) fn needs(&self, setup: &Setup<'_>) -> Needs {
-        Layout::new(setup, self.ratio).needs(setup.common.items().div_ceil(self.minibatches), 0)
+    pub(super) fn memory_plan(&self, setup: &Setup<'_>) -> MemoryPlan {
+        Layout::new(setup, self.ratio).memory_plan(setup.common.items().div_ceil(self.minibatches), 0)
     }
 }
 
@@ -164,8 +164,8 @@ impl PpoRule {
     }
 
     /// Takes one step of Adam on the worker's replica. The gradient of each network is bounded separately.
-    fn step(&mut self, student: &mut Student, workers: &dyn Workers, progress: &Progress, sums: &LossSums) {
-        let (Self { settings, adam, .. }, Student { nets, lr, skipped, .. }) = (self, student);
+    fn step(&mut self, on_policy: &mut OnPolicyState, workers: &dyn Workers, progress: &Progress, sums: &LossSums) {
+        let (Self { settings, adam, .. }, OnPolicyState { nets, lr, skipped, .. }) = (self, on_policy);
         // no agent acted in this batch
         if sums.samples == 0.0 {
             return;
@@ -201,10 +201,10 @@ impl PpoRule {
     }
 }
 
-impl Rule for PpoRule {
+impl UpdateRule for PpoRule {
     fn learn(
         &mut self,
-        student: &mut Student,
+        on_policy: &mut OnPolicyState,
         workers: &mut dyn Workers,
         experience: &Experience<'_>,
         progress: &Progress,
@@ -213,7 +213,7 @@ impl Rule for PpoRule {
         let objective = self.objective(experience, progress);
         let mut items: Vec<u32> = (0..experience.items() as u32).collect();
         if lr_schedule == LrSchedule::Linear {
-            student.lr = lr * progress.rate(LrSchedule::Linear);
+            on_policy.lr = lr * progress.rate(LrSchedule::Linear);
         }
         let mut all = LossSums::default();
         for epoch in 0..epochs {
@@ -221,9 +221,9 @@ impl Rule for PpoRule {
             SplitMix::new(self.seed, draw | SHUFFLES).shuffle(&mut items);
             for m in 0..minibatches {
                 let batch = &items[share(items.len(), minibatches, m)];
-                let sums = student.gradient(workers, experience, batch, objective, None);
+                let sums = on_policy.gradient(workers, experience, batch, objective, None);
                 all += sums;
-                self.step(student, workers, progress, &sums);
+                self.step(on_policy, workers, progress, &sums);
             }
         }
         all

@@ -15,10 +15,10 @@ use crate::error::Error;
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Blocks;
 use crate::lanes::noise::{EXPLORATION, PARAMETERS, SAMPLES, SplitMix};
-use crate::nets::graft::graft;
 use crate::nets::init::{Init, normal};
 use crate::nets::mlp::{CHUNK, Mlp, Tape};
 use crate::nets::normalize::{Moments, Normalizer};
+use crate::nets::widen::widen;
 use crate::optim::adam::Adam;
 use crate::policy::{Policy, PolicyMeta, check_widths};
 use marathon_physics::lanes::Isa;
@@ -149,7 +149,7 @@ impl Distiller {
     /// If the policy's network is wider or has another form.
     pub fn start_from(&mut self, policy: &Policy, sees: &[usize]) -> Result<(), Error> {
         let params = &mut self.params[..self.net.len()];
-        graft(&self.net, params, policy.net(), policy.params(), sees)?;
+        widen(&self.net, params, policy.net(), policy.params(), sees)?;
         self.moments.assume(policy.normalizer(), sees);
         self.started = true;
         self.normalizer = Normalizer::new(self.moments.mean32(), self.moments.std(), OBSERVATION_CLIP);

@@ -3,12 +3,12 @@
 pub mod acting;
 pub mod activation;
 pub mod gaussian;
-pub mod graft;
 pub mod init;
 pub mod mlp;
 pub mod normalize;
 pub mod penalty;
 pub mod squash;
+pub mod widen;
 
 use crate::error::Error;
 use activation::Activation;

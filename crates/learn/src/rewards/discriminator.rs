@@ -15,7 +15,7 @@
 //! decision. Demonstrations are normalized with the current statistics of the agent's observations.
 
 use super::kernels::place;
-use super::{Judge, Lesson, Purpose, Reward, Step};
+use super::{Minibatch, Purpose, Reward, RewardModel, Step};
 use crate::error::Error;
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Blocks;
@@ -266,7 +266,7 @@ impl Discriminator {
     }
 
     /// Draws sixteen demonstrated decisions into a block of its input.
-    fn draw(&self, expert: &Expert, lesson: &Lesson<'_>, random: &mut SplitMix, block: &mut [f32]) {
+    fn draw(&self, expert: &Expert, minibatch: &Minibatch<'_>, random: &mut SplitMix, block: &mut [f32]) {
         let n = self.sees.len();
         for lane in 0..BLOCK {
             let motion = &expert.motions[random.below(expert.motions.len())];
@@ -275,7 +275,7 @@ impl Discriminator {
             for (k, row) in expert.decisions[decision][..states].iter().enumerate() {
                 let row = &expert.rows[row * n..(row + 1) * n];
                 for (i, (from, x)) in self.sees.iter().zip(row).enumerate() {
-                    block[(k * n + i) * BLOCK + lane] = lesson.normalizer.number(*from, *x);
+                    block[(k * n + i) * BLOCK + lane] = minibatch.normalizer.number(*from, *x);
                 }
             }
             let action = &expert.actions[decision * self.act..(decision + 1) * self.act];
@@ -346,8 +346,8 @@ impl Reward for Discriminator {
     fn init(&self, params: &mut [f32], random: &mut SplitMix) {
         init::orthogonal(&self.net, params, 1.0, random);
     }
-    fn judge(&self) -> Box<dyn Judge> {
-        Box::new(DiscriminatorJudge { nets: self.clone(), space: self.space() })
+    fn reward_model(&self) -> Box<dyn RewardModel> {
+        Box::new(DiscriminatorModel { nets: self.clone(), space: self.space() })
     }
     fn ignores_done(&self) -> bool {
         false
@@ -358,12 +358,12 @@ impl Reward for Discriminator {
 }
 
 /// The network with its work space.
-struct DiscriminatorJudge {
+struct DiscriminatorModel {
     nets: Discriminator,
     space: DiscriminatorSpace<f32>,
 }
 
-impl Judge for DiscriminatorJudge {
+impl RewardModel for DiscriminatorModel {
     fn reward(&mut self, isa: Isa, params: &[f32], steps: &[Step<'_, f32>], out: &mut [f32]) {
         for (b, step) in steps.iter().enumerate() {
             self.nets.see(step, self.space.own.block_mut(b));
@@ -376,17 +376,17 @@ impl Judge for DiscriminatorJudge {
         isa: Isa,
         params: &[f32],
         steps: &[Step<'_, f32>],
-        lesson: &Lesson<'_>,
+        minibatch: &Minibatch<'_>,
         gradient: &mut [f32],
     ) {
         let Self { nets, space } = self;
         let expert = nets.expert.clone().expect("runs without demonstrations are refused");
-        let seed = seed_of_demonstrations(nets.seed, lesson.batch);
+        let seed = seed_of_demonstrations(nets.seed, minibatch.batch);
         let used = ((steps.len() as f64 * nets.settings.share).ceil() as usize).clamp(1, steps.len());
-        for (b, (step, item)) in steps[..used].iter().zip(lesson.items).enumerate() {
+        for (b, (step, item)) in steps[..used].iter().zip(minibatch.items).enumerate() {
             nets.see(step, space.own.block_mut(b));
             let mut random = SplitMix::new(seed, u64::from(*item));
-            nets.draw(&expert, lesson, &mut random, space.expert.block_mut(b));
+            nets.draw(&expert, minibatch, &mut random, space.expert.block_mut(b));
         }
         f32_lanes!(isa, T => nets.learn::<T>(params, used, space, gradient));
         // scales up to all samples

@@ -2,8 +2,8 @@
 //! discount, strength and stream of values. You can combine any number of them.
 //!
 //! Rewards for novelty, [curiosity] and [random network distillation](rnd), have their own networks. These compute a
-//! reward for each step of a rollout ([`Judge::reward`]), and learn from the same minibatches as policy and value
-//! function ([`Judge::gradient`]). The reward fades where they have learned. A reward for [imitation](discriminator)
+//! reward for each step of a rollout ([`RewardModel::reward`]), and learn from the same minibatches as policy and value
+//! function ([`RewardModel::gradient`]). The reward fades where they have learned. A reward for [imitation](discriminator)
 //! learns to distinguish the agent's decisions from demonstrated ones. To add a kind of reward, implement [`Reward`].
 
 pub mod curiosity;
@@ -160,7 +160,7 @@ pub trait Reward: Send + Sync {
     /// Initializes the parameters.
     fn init(&self, params: &mut [f32], random: &mut SplitMix);
     /// Creates the networks with their work space, one for each worker.
-    fn judge(&self) -> Box<dyn Judge>;
+    fn reward_model(&self) -> Box<dyn RewardModel>;
     /// Whether the reward continues beyond the end of an episode.
     fn ignores_done(&self) -> bool {
         true
@@ -172,7 +172,7 @@ pub trait Reward: Send + Sync {
 }
 
 /// The networks of a [`Reward`] with their work space.
-pub trait Judge: Send {
+pub trait RewardModel: Send {
     /// Computes rewards of at most [`CHUNK`](crate::nets::mlp::CHUNK) blocks of steps, a row of sixteen each.
     fn reward(&mut self, isa: Isa, params: &[f32], steps: &[Step<'_, f32>], out: &mut [f32]);
     /// Overwrites `gradient` with that of the networks' loss, summed over the steps.
@@ -181,14 +181,14 @@ pub trait Judge: Send {
         isa: Isa,
         params: &[f32],
         steps: &[Step<'_, f32>],
-        lesson: &Lesson<'_>,
+        minibatch: &Minibatch<'_>,
         gradient: &mut [f32],
     );
 }
 
-/// Context of the steps that a [`Judge`] learns from.
+/// Context of the steps that a [`RewardModel`] learns from.
 #[derive(Clone, Copy)]
-pub struct Lesson<'a> {
+pub struct Minibatch<'a> {
     /// Map that normalized their observations.
     pub normalizer: &'a Normalizer,
     /// Index of the minibatch in the run.

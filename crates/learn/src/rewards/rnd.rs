@@ -2,7 +2,7 @@
 //! parameters. Its squared error is large for new observations, and is the reward.
 
 use super::kernels::{Distance, place};
-use super::{Judge, Lesson, Reward, Step};
+use super::{Minibatch, Reward, RewardModel, Step};
 use crate::lanes::BLOCK;
 use crate::lanes::buffer::Blocks;
 use crate::lanes::f32_lanes;
@@ -38,23 +38,23 @@ impl Reward for Rnd {
     fn init(&self, params: &mut [f32], random: &mut SplitMix) {
         self.init(params, random);
     }
-    fn judge(&self) -> Box<dyn Judge> {
-        Box::new(RndJudge { nets: self.clone(), space: self.space() })
+    fn reward_model(&self) -> Box<dyn RewardModel> {
+        Box::new(RndModel { nets: self.clone(), space: self.space() })
     }
 }
 
 /// The networks with their work space.
-struct RndJudge {
+struct RndModel {
     nets: Rnd,
     space: RndSpace<f32>,
 }
 
-impl Judge for RndJudge {
+impl RewardModel for RndModel {
     fn reward(&mut self, isa: Isa, params: &[f32], steps: &[Step<'_, f32>], out: &mut [f32]) {
         f32_lanes!(isa, T => self.nets.losses::<T>(params, steps, &mut self.space));
         self.nets.reward(&self.space, steps.len(), out);
     }
-    fn gradient(&mut self, isa: Isa, params: &[f32], steps: &[Step<'_, f32>], _: &Lesson<'_>, gradient: &mut [f32]) {
+    fn gradient(&mut self, isa: Isa, params: &[f32], steps: &[Step<'_, f32>], _: &Minibatch<'_>, gradient: &mut [f32]) {
         f32_lanes!(isa, T => {
             self.nets.losses::<T>(params, steps, &mut self.space);
             self.nets.gradient::<T>(params, steps.len(), &mut self.space, gradient);

@@ -4,11 +4,11 @@
 //! per block. Totals are taken in the order of the blocks, so they do not depend on how blocks are distributed over
 //! workers.
 //!
-//! Each role of the task has a [`Seat`] with its own rollout. Most tasks have one role.
+//! Each role of the task has a [`RoleRollout`] with its own rollout. Most tasks have one role.
 
 use super::context::RolloutContext;
 use super::data::Rollout;
-use super::seat::{Seat, SeatPlan};
+use super::role_rollout::{RoleRollout, RoleSetup};
 use crate::lanes::BLOCK;
 use crate::lanes::mirror;
 use crate::nets::mlp::CHUNK;
@@ -22,7 +22,7 @@ pub struct Collector {
     blocks: usize,
     /// Agents per block.
     lanes: usize,
-    seats: Vec<Seat>,
+    seats: Vec<RoleRollout>,
     /// The actions in the environment's units, `[block][act][16]`.
     action: Vec<f32>,
     /// Observation of a block, `[obs][16]`, if several roles see parts of it.
@@ -37,11 +37,11 @@ impl Collector {
         factory: &dyn ShardFactory,
         (first_block, blocks): (usize, usize),
         seed: u64,
-        plans: Vec<SeatPlan<'_>>,
+        plans: Vec<RoleSetup<'_>>,
     ) -> Self {
         let spec = factory.spec();
         let lanes = plans[0].lanes;
-        let seat = |(number, plan)| Seat::new(number, plan, (first_block, blocks));
+        let seat = |(number, plan)| RoleRollout::new(number, plan, (first_block, blocks));
         let mut collector = Self {
             shard: factory.shard(first_block, blocks, seed),
             first_block,
@@ -75,11 +75,11 @@ impl Collector {
         &mut *self.shard
     }
     /// The roles' seats.
-    pub fn seats(&self) -> &[Seat] {
+    pub fn seats(&self) -> &[RoleRollout] {
         &self.seats
     }
     /// The roles' seats.
-    pub fn seats_mut(&mut self) -> &mut [Seat] {
+    pub fn seats_mut(&mut self) -> &mut [RoleRollout] {
         &mut self.seats
     }
     /// The current actions of a block, in the environment's units, `[act][16]`.
@@ -190,7 +190,7 @@ impl Collector {
 }
 
 /// Buffer for the observations of a block: that of the single role, or one for the whole observation.
-fn observation<'a>(seats: &'a mut [Seat], b: usize, whole: &'a mut [f32]) -> &'a mut [f32] {
+fn observation<'a>(seats: &'a mut [RoleRollout], b: usize, whole: &'a mut [f32]) -> &'a mut [f32] {
     match seats {
         [seat] => seat.obs_mut(b),
         _ => whole,

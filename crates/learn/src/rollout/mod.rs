@@ -5,7 +5,7 @@ pub mod collect;
 pub mod context;
 pub mod data;
 pub(crate) mod replay;
-pub mod seat;
+pub mod role_rollout;
 pub(crate) mod states;
 pub mod statistics;
 pub mod sums;

@@ -6,7 +6,7 @@
 
 use super::config::{MAX_STEPS, TrainConfig};
 use super::roles::RoleReplica;
-use super::{Clocks, Trainer, states};
+use super::{Clocks, TrainLoop, states};
 use crate::algorithms::{Numbers, Saved};
 use crate::error::Error;
 use crate::files::{self, Dtype, TensorReader, TensorWriter, read_description, write_atomic, write_description};
@@ -138,8 +138,8 @@ fn rewards(config: &TrainConfig) -> String {
 }
 
 impl Checkpoint {
-    pub(super) fn of(trainer: &Trainer) -> Self {
-        let Trainer { shared, replica, clocks, .. } = trainer;
+    pub(super) fn of(trainer: &TrainLoop) -> Self {
+        let TrainLoop { shared, replica, clocks, .. } = trainer;
         let (mut roles, mut about_roles) = (Vec::new(), Vec::new());
         for (role, RoleReplica { learner, statistics, average }) in shared.roles.iter().zip(&replica.roles) {
             let mut saved = learner.save();
@@ -206,7 +206,7 @@ impl Checkpoint {
     }
 
     /// Puts a fresh run into the state of the checkpoint.
-    pub(super) fn restore(self, trainer: &mut Trainer) -> Result<(), Error> {
+    pub(super) fn restore(self, trainer: &mut TrainLoop) -> Result<(), Error> {
         let (about, old, new, spec) = (&self.about, &self.about.config, &trainer.shared.config, &trainer.shared.spec);
         let names = |roles: &mut dyn Iterator<Item = &String>| roles.map(String::as_str).collect::<Vec<_>>().join(", ");
         let mut pairs = vec![

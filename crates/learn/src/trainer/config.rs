@@ -4,7 +4,7 @@ use crate::algorithms::a2c::A2c;
 use crate::algorithms::acktr::Acktr;
 use crate::algorithms::ppo::Ppo;
 use crate::algorithms::sac::Sac;
-use crate::algorithms::{Algorithm, Common, Setup, check};
+use crate::algorithms::{Algorithm, Setup, SharedConfig, check};
 use crate::error::Error;
 use crate::lanes::BLOCK;
 use crate::nets::NetworkConfig;
@@ -333,8 +333,8 @@ impl TrainConfig {
         Setup { spec, isa, common: self.common(), action_clip: self.algorithm.action_clip(), demonstrations }
     }
 
-    fn common(&self) -> Common<'_> {
-        Common {
+    fn common(&self) -> SharedConfig<'_> {
+        SharedConfig {
             network: &self.network,
             rewards: &self.rewards,
             statistics: &self.statistics,

@@ -72,14 +72,14 @@ pub fn evaluate_roles(
         return Err(Error::config("episodes", 0, "at least 1"));
     }
     // agents that are stepped all at once are all there, needed or not
-    let crowd = factory.lockstep();
-    let slots = options.episodes.min(crowd.unwrap_or(MAX_SLOTS));
-    let blocks = crowd.unwrap_or(slots).div_ceil(BLOCK);
+    let at_once = factory.lockstep();
+    let slots = options.episodes.min(at_once.unwrap_or(MAX_SLOTS));
+    let blocks = at_once.unwrap_or(slots).div_ceil(BLOCK);
     // slot i plays episodes i, i + slots, ...
     let quota = |slot: usize| if slot < slots { (options.episodes - slot).div_ceil(slots) } else { 0 };
     let threads = match options.threads {
         // a thread whose agents are done must not leave the others waiting
-        _ if crowd.is_some() => 1,
+        _ if at_once.is_some() => 1,
         0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
         n => n,
     };

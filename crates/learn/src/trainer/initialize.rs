@@ -1,11 +1,11 @@
 //! Runs that start from a policy in place of random weights.
 
-use super::Trainer;
+use super::TrainLoop;
 use super::checkpoint::Checkpoint;
 use super::config::TrainConfig;
 use crate::error::Error;
-use crate::nets::graft::graft;
 use crate::nets::mlp::Mlp;
+use crate::nets::widen::widen;
 use crate::policy::Policy;
 use marathon_envs::ShardFactory;
 use marathon_physics::lanes::Isa;
@@ -22,7 +22,7 @@ pub fn initialized(
     policy: &Policy,
     sees: &[usize],
 ) -> Result<Checkpoint, Error> {
-    let mut trainer = Trainer::new(factory, isa, &config.clone().with(|config| config.run.threads = 1))?;
+    let mut trainer = TrainLoop::new(factory, isa, &config.clone().with(|config| config.run.threads = 1))?;
     let role = &trainer.shared.roles[0];
     let meta = policy.meta();
     if role.config.algorithm.clone().action_std_mut().is_none() {
@@ -43,7 +43,7 @@ pub fn initialized(
     let learner = &mut trainer.replica.roles[0];
     // the policy network's parameters are the first ones
     let params = &mut learner.learner.params_mut()[..net.len()];
-    graft(&net, params, policy.net(), policy.params(), sees)?;
+    widen(&net, params, policy.net(), policy.params(), sees)?;
     // actions drawn are divided by their bound
     let bound = role.config.algorithm.action_clip() as f32;
     if bound != 1.0 {

@@ -2,7 +2,7 @@
 
 use super::config::TrainConfig;
 use super::roles::RoleParts;
-use crate::algorithms::{Algorithm, Needs, Setup, group_count};
+use crate::algorithms::{Algorithm, MemoryPlan, Setup, group_count};
 use crate::error::Error;
 use crate::lanes::BLOCK;
 use marathon_physics::lanes::Isa;
@@ -52,7 +52,7 @@ fn less(config: &TrainConfig) -> String {
 /// Bytes that a role of a run needs. Its large arrays are those of [`Crew`](super::workers::Crew), of each worker's
 /// [`Learner`](crate::algorithms::Learner), of [`Rollout`](crate::rollout::data::Rollout), and what the algorithm keeps.
 fn bytes(setup: &Setup<'_>, config: &TrainConfig) -> u64 {
-    let Needs { parameters, moments, items, shape, replay } = config.algorithm.needs(setup);
+    let MemoryPlan { parameters, moments, items, shape, replay } = config.algorithm.memory_plan(setup);
     let (params, workers) = (parameters as u64, config.run.worker_count() as u64);
     let rollouts = (setup.common.items() * BLOCK) as u64 * shape.numbers() as u64;
     let groups = group_count(items) as u64;

@@ -30,7 +30,7 @@ mod workers;
 
 use crate::algorithms::loss::LossSums;
 use crate::algorithms::schedule::Progress;
-use crate::algorithms::{Needs, Now, share};
+use crate::algorithms::{MemoryPlan, Now, share};
 use crate::error::Error;
 use crate::policy::Policy;
 use crate::rollout::collect::Collector;
@@ -106,8 +106,8 @@ pub fn train_with(
         check_travels(config, factory.spec())?;
     }
     let mut trainer = match resume {
-        None => Trainer::new(factory, isa, config)?,
-        Some(checkpoint) => Trainer::resume(factory, isa, config, checkpoint)?,
+        None => TrainLoop::new(factory, isa, config)?,
+        Some(checkpoint) => TrainLoop::resume(factory, isa, config, checkpoint)?,
     };
     let mut last = None;
     while !trainer.is_done() {
@@ -128,7 +128,7 @@ pub fn train_with(
 }
 
 /// A run that is made an iteration at a time.
-pub struct Trainer {
+pub struct TrainLoop {
     shared: Arc<Shared>,
     /// The first worker's.
     replica: Replica,
@@ -201,7 +201,7 @@ struct Sums {
     updates: LossSums,
 }
 
-impl Trainer {
+impl TrainLoop {
     /// A run at its start.
     ///
     /// # Errors
@@ -245,7 +245,7 @@ impl Trainer {
             progress: Progress { iteration: 0, steps: 0, total_steps: config.run.total_steps },
         };
         let collector = |share: &Range<usize>| {
-            let plans = replica.roles.iter().zip(&roles).map(|(replica, role)| replica.seat(role)).collect();
+            let plans = replica.roles.iter().zip(&roles).map(|(replica, role)| replica.role_setup(role)).collect();
             Mutex::new(Collector::new(factory, (share.start, share.len()), config.run.seed, plans))
         };
         let collectors = shares.iter().map(collector).collect();
@@ -253,7 +253,7 @@ impl Trainer {
         let crew = |(role, RoleReplica { learner, .. }): (&RoleParts, &RoleReplica)| {
             let shape = learner.shape();
             let rollouts = shares.iter().map(|share| Rollout::new(share.len(), config.run.horizon, &shape)).collect();
-            let Needs { items, moments, .. } = role.config.algorithm.needs(&role.setup(isa));
+            let MemoryPlan { items, moments, .. } = role.config.algorithm.memory_plan(&role.setup(isa));
             Crew::new(isa, &**learner, (items, moments), rollouts, barrier.clone())
         };
         let crews = roles.iter().zip(&replica.roles).map(crew).collect();
@@ -414,7 +414,7 @@ impl Trainer {
     }
 }
 
-impl Drop for Trainer {
+impl Drop for TrainLoop {
     /// Ends the other workers.
     fn drop(&mut self) {
         self.shared.quit.store(true, Ordering::Release);

@@ -2,7 +2,7 @@
 
 use super::checkpoint::Checkpoint;
 use super::stats::IterationStats;
-use super::{TrainOutput, Trainer};
+use super::{TrainLoop, TrainOutput};
 use crate::policy::Policy;
 
 /// What an observer wants.
@@ -28,7 +28,7 @@ impl<F: FnMut(&IterationStats, &Snapshot<'_>) -> Control> Observer for F {
 }
 
 /// The state of a run between two iterations.
-pub struct Snapshot<'a>(pub(super) &'a Trainer);
+pub struct Snapshot<'a>(pub(super) &'a TrainLoop);
 
 impl Snapshot<'_> {
     /// The policy as it is now: of a task with several roles, the first one's.

@@ -110,7 +110,7 @@ impl Player {
         let role = RoleParts::all(config, &spec)?.swap_remove(0);
         let replica = RoleReplica::new(&role, isa, &[blocks.len()]);
         let (shape, place) = (replica.learner.shape(), (blocks.start, blocks.len()));
-        let collector = Collector::new(factory, place, config.run.seed, vec![replica.seat(&role)]);
+        let collector = Collector::new(factory, place, config.run.seed, vec![replica.role_setup(&role)]);
         let rollout = Rollout::new(blocks.len(), config.run.horizon, &shape);
         Ok(Self { replica, collector, rollout, spec, blocks })
     }

@@ -8,7 +8,7 @@ use crate::algorithms::{Algorithm, Learner, Setup};
 use crate::error::Error;
 use crate::lanes::noise::seed_of_role;
 use crate::policy::{Policy, PolicyMeta, Training};
-use crate::rollout::seat::SeatPlan;
+use crate::rollout::role_rollout::RoleSetup;
 use crate::rollout::statistics::Statistics;
 use crate::rollout::sums::Totals;
 use marathon_envs::{Demonstrations, Role, ShardFactory, Spec};
@@ -145,10 +145,10 @@ impl RoleReplica {
     }
 
     /// What it plays with.
-    pub fn seat(&self, role: &RoleParts) -> SeatPlan<'_> {
+    pub fn role_setup(&self, role: &RoleParts) -> RoleSetup<'_> {
         let (seed, lanes) = (role.config.run.seed, self.learner.shape().lanes);
         let metrics = role.spec.own_metrics().cloned().collect();
-        SeatPlan { role: role.role.clone(), seed, lanes, metrics, with: self.learner.collecting(&self.statistics) }
+        RoleSetup { role: role.role.clone(), seed, lanes, metrics, with: self.learner.collecting(&self.statistics) }
     }
 
     /// Takes in the statistics of a rollout.

@@ -54,7 +54,7 @@ const GOLDEN: f64 = 0.381_966_011_250_105 * TAU;
 
 /// How well a policy tracks commands.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Obedience {
+pub struct CommandTracking {
     /// The task.
     pub task: String,
     /// Agents of each trial.
@@ -238,7 +238,7 @@ fn obedient() -> Vec<String> {
 ///
 /// # Errors
 /// If the policy's task does not exist, or has no speed command.
-pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Obedience, RunError> {
+pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<CommandTracking, RunError> {
     let setting = Setting::asked(policy.meta()).from_the_first()?;
     let commands = Commands::of(policy, &setting)?;
     let trial = || Trial::new(&setting, policy, options, commands.speed);
@@ -269,7 +269,7 @@ pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Obedience, RunE
     let lying = trial()?;
     let rise = if lying.can_rise() { Some(rise(lying, &commands)?) } else { None };
     let pushes = PUSHES.into_iter().map(|velocity| push(trial()?, &commands, half, velocity));
-    Ok(Obedience {
+    Ok(CommandTracking {
         task: policy.meta().agent.clone(),
         agents: options.episodes as u64,
         dt: policy.meta().control_dt,

@@ -1,15 +1,15 @@
 //! Results of a command tracking measurement as text and as a picture.
 
-use super::{EARLY, Minutes, Obedience, PROMPT, SETTLED, STANDING, Stand, UP};
+use super::{CommandTracking, EARLY, Minutes, PROMPT, SETTLED, STANDING, Stand, UP};
 use crate::error::RunError;
 use crate::report::chart::Chart;
 use std::fmt::Write;
 use std::path::Path;
 
-impl Obedience {
+impl CommandTracking {
     /// The results as tables.
     pub fn table(&self) -> String {
-        let Obedience { agents, minutes, stand, .. } = self;
+        let CommandTracking { agents, minutes, stand, .. } = self;
         let Minutes { without_fall, early_falls, falls_per_minute, velocity_error, settled_error, slide } = minutes;
         let Stand { still, falls, drift, speed } = stand;
         let number = |x: &Option<f64>, unit: &str| x.map_or("-".into(), |x| format!("{x:.2} {unit}"));

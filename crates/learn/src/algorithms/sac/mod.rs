@@ -19,7 +19,7 @@ mod networks;
 use super::loss::LossSums;
 use super::parameters::Places;
 use super::schedule::{LrSchedule, Progress};
-use super::{Common, Description, Learner, Needs, Now, Saved, Setup, Workers, check, load_adam, save_adam};
+use super::{Description, Learner, MemoryPlan, Now, Saved, Setup, SharedConfig, Workers, check, load_adam, save_adam};
 use crate::error::Error;
 use crate::lanes::BLOCK;
 use crate::lanes::noise::{Noise, SAMPLES, SplitMix};
@@ -90,7 +90,7 @@ impl Sac {
     ///
     /// # Errors
     /// Names the field, its value and the values that are valid.
-    pub fn validate(&self, common: &Common<'_>) -> Result<(), Error> {
+    pub fn validate(&self, common: &SharedConfig<'_>) -> Result<(), Error> {
         if common.agents < BLOCK {
             let nearest = format!("a multiple of {BLOCK}, such as {BLOCK} with sac");
             return Err(Error::config("run.agents", common.agents, nearest));
@@ -130,10 +130,10 @@ impl Sac {
     }
 
     /// Memory that a run needs.
-    pub(super) fn needs(&self, setup: &Setup<'_>) -> Needs {
+    pub(super) fn memory_plan(&self, setup: &Setup<'_>) -> MemoryPlan {
         let layout = Layout::new(setup);
         let (obs, act) = (setup.spec.obs as u64, setup.spec.act as u64);
-        Needs {
+        MemoryPlan {
             parameters: layout.places.total(),
             moments: 0,
             items: self.batch / BLOCK,

@@ -1,12 +1,12 @@
-//! Contract: agents that are stepped all at once ([`Lockstep`]) give the same training as agents in blocks: the same
-//! bits, for any number of threads and over an interruption. A crowd that fails ends the run with the reason.
+//! Contract: agents that are stepped all at once ([`BatchAdapter`]) give the same training as agents in blocks: the same
+//! bits, for any number of threads and over an interruption. A task that fails ends the run with the reason.
 
 mod common;
 
 use common::{silent, small_config};
 use marathon_envs::{
-    AgentShards, Crowd, CrowdError, CrowdFailed, Lockstep, Shard, ShardFactory, Spec, StepMut, VecEnv, VecEnvOptions,
-    registry,
+    AgentShards, BatchAdapter, BatchTask, BatchTaskError, BatchTaskFailed, Shard, ShardFactory, Spec, StepMut, VecEnv,
+    VecEnvOptions, registry,
 };
 use marathon_learn::{
     Checkpoint, Control, EvalOptions, IterationStats, Snapshot, TrainConfig, TrainOutput, evaluate, train,
@@ -24,18 +24,18 @@ fn config(threads: usize) -> TrainConfig {
     })
 }
 
-fn crowd() -> VecEnv {
+fn task() -> VecEnv {
     // an end in each rollout, and a seed that must not matter
     let agents = small_config().run.agents;
     let options = VecEnvOptions { agents, seed: 99, max_episode_steps: Some(20), ..Default::default() };
     VecEnv::new(TASK, &options).unwrap()
 }
 
-fn lockstep(crowd: impl Crowd + 'static) -> Lockstep {
-    Lockstep::new(Box::new(crowd), self::crowd().spec().clone(), small_config().run.agents)
+fn lockstep(task: impl BatchTask + 'static) -> BatchAdapter {
+    BatchAdapter::new(Box::new(task), self::task().spec().clone(), small_config().run.agents)
 }
 
-/// The task's own blocks, with the crowd's limit.
+/// The task's own blocks, with the task's limit.
 struct Blocks(Arc<dyn AgentShards>);
 
 impl ShardFactory for Blocks {
@@ -59,7 +59,7 @@ fn the_same_bits_for_any_number_of_threads() {
     let blocks = Blocks(registry::global().shards(TASK, Isa::best()).unwrap());
     let want = train(&blocks, Isa::best(), &config(2), None, &mut silent).unwrap();
     for threads in [1, 2, 3] {
-        let got = train(&lockstep(crowd()), Isa::best(), &config(threads), None, &mut silent).unwrap();
+        let got = train(&lockstep(task()), Isa::best(), &config(threads), None, &mut silent).unwrap();
         assert_eq!(bits(&want), bits(&got), "{threads} threads");
         let (a, b) = (want.last.as_ref().unwrap(), got.last.as_ref().unwrap());
         assert_eq!(
@@ -72,22 +72,22 @@ fn the_same_bits_for_any_number_of_threads() {
 
 #[test]
 fn the_same_bits_over_an_interruption() {
-    let want = train(&lockstep(crowd()), Isa::best(), &config(2), None, &mut silent).unwrap();
+    let want = train(&lockstep(task()), Isa::best(), &config(2), None, &mut silent).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let mut stop = |_: &IterationStats, snapshot: &Snapshot<'_>| {
         snapshot.checkpoint().save(folder.path()).unwrap();
         Control::Stop
     };
-    train(&lockstep(crowd()), Isa::best(), &config(1), None, &mut stop).unwrap();
+    train(&lockstep(task()), Isa::best(), &config(1), None, &mut stop).unwrap();
     let checkpoint = Checkpoint::load(folder.path()).unwrap();
-    let got = train(&lockstep(crowd()), Isa::best(), &config(2), Some(checkpoint), &mut silent).unwrap();
+    let got = train(&lockstep(task()), Isa::best(), &config(2), Some(checkpoint), &mut silent).unwrap();
     assert_eq!(bits(&want), bits(&got));
 }
 
 #[test]
 fn the_same_evaluation_however_often() {
     let blocks = Blocks(registry::global().shards(TASK, Isa::best()).unwrap());
-    let factory = lockstep(crowd());
+    let factory = lockstep(task());
     // the training factory also evaluates
     let policy = train(&factory, Isa::best(), &config(2), None, &mut silent).unwrap().policy;
     for episodes in [small_config().run.agents, 5] {
@@ -105,29 +105,29 @@ fn the_same_evaluation_however_often() {
 /// Fails at a decision.
 struct Fragile(VecEnv, usize);
 
-impl Crowd for Fragile {
-    fn reset(&mut self, seed: u64, obs: &mut [f32]) -> Result<(), CrowdError> {
-        Crowd::reset(&mut self.0, seed, obs)
+impl BatchTask for Fragile {
+    fn reset(&mut self, seed: u64, obs: &mut [f32]) -> Result<(), BatchTaskError> {
+        BatchTask::reset(&mut self.0, seed, obs)
     }
-    fn step(&mut self, actions: &[f32], out: StepMut<'_>) -> Result<(), CrowdError> {
+    fn step(&mut self, actions: &[f32], out: StepMut<'_>) -> Result<(), BatchTaskError> {
         self.1 = self.1.checked_sub(1).ok_or("it has had enough")?;
-        Crowd::step(&mut self.0, actions, out)
+        BatchTask::step(&mut self.0, actions, out)
     }
-    fn save(&self) -> Result<Vec<u8>, CrowdError> {
-        Crowd::save(&self.0)
+    fn save(&self) -> Result<Vec<u8>, BatchTaskError> {
+        BatchTask::save(&self.0)
     }
-    fn load(&mut self, bytes: &[u8]) -> Result<(), CrowdError> {
-        Crowd::load(&mut self.0, bytes)
+    fn load(&mut self, bytes: &[u8]) -> Result<(), BatchTaskError> {
+        BatchTask::load(&mut self.0, bytes)
     }
 }
 
 #[test]
 fn a_crowd_that_fails_ends_the_run() {
     for threads in [1, 3] {
-        let factory = lockstep(Fragile(crowd(), 7));
+        let factory = lockstep(Fragile(task(), 7));
         let run = || train(&factory, Isa::best(), &config(threads), None, &mut silent).map(|_| ());
         let panic = catch_unwind(AssertUnwindSafe(run)).expect_err("it fails");
-        assert!(panic.is::<CrowdFailed>(), "{threads} threads");
+        assert!(panic.is::<BatchTaskFailed>(), "{threads} threads");
         assert_eq!(factory.take_error().expect("a reason").to_string(), "it has had enough");
     }
 }

@@ -3,7 +3,7 @@
 
 use crate::error;
 use marathon_envs::{
-    CommandRange, Crowd, CrowdError, Lockstep, Metric, MetricSource, ObsGroup, Options, Spec, StepMut,
+    BatchAdapter, BatchTask, BatchTaskError, CommandRange, Metric, MetricSource, ObsGroup, Options, Spec, StepMut,
 };
 use numpy::{AllowTypeChange, Element, PyArray1, PyArrayLikeDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::conversion::FromPyObjectOwned;
@@ -12,18 +12,18 @@ use pyo3::types::PyBytes;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 /// Agents behind a Python object with the interface of `VecEnv` that resets in the same step.
-struct PyCrowd {
+struct PyBatchTask {
     env: Py<PyAny>,
     agents: usize,
     act: usize,
 }
 
-impl Crowd for PyCrowd {
-    fn reset(&mut self, seed: u64, obs: &mut [f32]) -> Result<(), CrowdError> {
+impl BatchTask for PyBatchTask {
+    fn reset(&mut self, seed: u64, obs: &mut [f32]) -> Result<(), BatchTaskError> {
         Python::attach(|py| copy("obs", &self.env.bind(py).call_method1("reset", (seed,))?, obs)).map_err(Into::into)
     }
 
-    fn step(&mut self, actions: &[f32], out: StepMut<'_>) -> Result<(), CrowdError> {
+    fn step(&mut self, actions: &[f32], out: StepMut<'_>) -> Result<(), BatchTaskError> {
         let result = Python::attach(|py| -> PyResult<()> {
             let env = self.env.bind(py);
             let actions = PyArray1::from_slice(py, actions).reshape([self.agents, self.act])?;
@@ -41,12 +41,12 @@ impl Crowd for PyCrowd {
         result.map_err(Into::into)
     }
 
-    fn save(&self) -> Result<Vec<u8>, CrowdError> {
+    fn save(&self) -> Result<Vec<u8>, BatchTaskError> {
         Python::attach(|py| -> PyResult<Vec<u8>> { self.env.bind(py).call_method0("save")?.extract() })
             .map_err(Into::into)
     }
 
-    fn load(&mut self, bytes: &[u8]) -> Result<(), CrowdError> {
+    fn load(&mut self, bytes: &[u8]) -> Result<(), BatchTaskError> {
         Python::attach(|py| self.env.bind(py).call_method1("load", (PyBytes::new(py, bytes),)).map(|_| ()))
             .map_err(Into::into)
     }
@@ -133,7 +133,7 @@ fn commands(ranges: &Bound<'_, PyAny>) -> PyResult<Vec<CommandRange>> {
 }
 
 /// The blocks of a Python object with the interface of `VecEnv`.
-pub fn lockstep(env: &Bound<'_, PyAny>) -> PyResult<Lockstep> {
+pub fn lockstep(env: &Bound<'_, PyAny>) -> PyResult<BatchAdapter> {
     let spec = spec(env)?;
     let (agents, autoreset) = (env.len()?, env.getattr("autoreset")?.extract::<String>()?);
     if agents == 0 || !agents.is_multiple_of(marathon_envs::BLOCK) {
@@ -143,14 +143,14 @@ pub fn lockstep(env: &Bound<'_, PyAny>) -> PyResult<Lockstep> {
     if autoreset != "same_step" {
         return Err(error::value(format!("the environment's autoreset is '{autoreset}', expected 'same_step'")));
     }
-    let crowd = PyCrowd { env: env.clone().unbind(), agents, act: spec.act };
-    Ok(Lockstep::new(Box::new(crowd), spec, agents))
+    let batch_task = PyBatchTask { env: env.clone().unbind(), agents, act: spec.act };
+    Ok(BatchAdapter::new(Box::new(batch_task), spec, agents))
 }
 
-/// Runs `f` without the GIL. If a crowd fails in Python meanwhile, that is the error.
-pub fn run<R: Send>(py: Python<'_>, crowd: Option<&Lockstep>, f: impl FnOnce() -> R + Send) -> PyResult<R> {
+/// Runs `f` without the GIL. If a batch_task fails in Python meanwhile, that is the error.
+pub fn run<R: Send>(py: Python<'_>, batch_task: Option<&BatchAdapter>, f: impl FnOnce() -> R + Send) -> PyResult<R> {
     let result = py.detach(AssertUnwindSafe(|| catch_unwind(AssertUnwindSafe(f))));
-    result.map_err(|panic| match crowd.and_then(Lockstep::take_error).map(|e| e.downcast::<PyErr>()) {
+    result.map_err(|panic| match batch_task.and_then(BatchAdapter::take_error).map(|e| e.downcast::<PyErr>()) {
         Some(Ok(error)) => *error,
         Some(Err(error)) => error::value(error.to_string()),
         None => resume_unwind(panic),

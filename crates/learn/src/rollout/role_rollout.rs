@@ -9,12 +9,12 @@ use crate::lanes::buffer::{Aligned, Blocks};
 use crate::lanes::noise::Noise;
 use crate::nets::acting::ActingSpace;
 use crate::nets::mlp::{CHUNK, Tape};
-use crate::rewards::{Judge, Step};
+use crate::rewards::{RewardModel, Step};
 use marathon_envs::{BlockStep, Metric, Role};
 use marathon_physics::lanes::{Isa, Real};
 
 /// Settings of a role's seat.
-pub struct SeatPlan<'a> {
+pub struct RoleSetup<'a> {
     /// The role.
     pub role: Role,
     /// Seed of its random streams.
@@ -28,7 +28,7 @@ pub struct SeatPlan<'a> {
 }
 
 /// A role's part in the rollouts of consecutive blocks.
-pub struct Seat {
+pub struct RoleRollout {
     /// The role.
     pub role: Role,
     metrics: Vec<Metric>,
@@ -48,13 +48,13 @@ pub struct Seat {
     obs_sums: [Aligned<f32>; 2],
     space: ActingSpace,
     tape: Option<Tape<f32>>,
-    judges: Vec<Option<Box<dyn Judge>>>,
+    judges: Vec<Option<Box<dyn RewardModel>>>,
 }
 
-impl Seat {
+impl RoleRollout {
     /// Creates the seat of role `number` at `blocks` blocks from `first_block`.
-    pub fn new(number: usize, plan: SeatPlan<'_>, (first_block, blocks): (usize, usize)) -> Self {
-        let SeatPlan { role, seed, lanes, metrics, with } = plan;
+    pub fn new(number: usize, plan: RoleSetup<'_>, (first_block, blocks): (usize, usize)) -> Self {
+        let RoleSetup { role, seed, lanes, metrics, with } = plan;
         let n = role.obs.len() * BLOCK;
         let noise = |b| Noise::new(seed, first_block + b).mirrored(lanes);
         Self {
@@ -69,7 +69,7 @@ impl Seat {
             obs_sums: [Aligned::new(blocks * n), Aligned::new(blocks * n)],
             space: with.acting.space(role.act.len()),
             tape: with.values.as_ref().map(|values| values.net.inference_tape()),
-            judges: with.streams.iter().map(|s| s.networks.as_ref().map(|nets| nets.reward.judge())).collect(),
+            judges: with.streams.iter().map(|s| s.networks.as_ref().map(|nets| nets.reward.reward_model())).collect(),
             role,
         }
     }
@@ -211,7 +211,7 @@ impl Seat {
     pub fn end(&mut self, with: &RolloutContext<'_>, rollout: &mut Rollout) {
         self.add_up_observations(rollout);
         let Some(values) = &with.values else { return };
-        self.judge(with, rollout);
+        self.reward_model(with, rollout);
         self.evaluate(with, values, rollout);
         let gamma: Vec<f64> = with.streams.iter().map(|stream| stream.gamma).collect();
         advantage::estimate(with.acting.isa, &gamma, values.lambda, rollout);
@@ -232,7 +232,7 @@ impl Seat {
     }
 
     /// Computes the rewards that come from networks.
-    fn judge(&mut self, with: &RolloutContext<'_>, rollout: &mut Rollout) {
+    fn reward_model(&mut self, with: &RolloutContext<'_>, rollout: &mut Rollout) {
         let (items, streams, blocks) = (rollout.items(), rollout.streams, self.blocks());
         let mut rows = vec![0.0; CHUNK * BLOCK];
         for (s, (stream, judge)) in with.streams.iter().zip(&mut self.judges).enumerate() {

@@ -6,7 +6,7 @@ use marathon_envs::{
 };
 use marathon_learn::{Activation, EvalOptions, Policy, PolicyMeta};
 use marathon_physics::lanes::{Isa, Real};
-use marathon_runs::{Obedience, RunError, controller};
+use marathon_runs::{CommandTracking, RunError, controller};
 use std::sync::Arc;
 
 /// A cart of 2 kg on a rail.
@@ -96,7 +96,7 @@ fn policy(id: &str) -> Policy {
     Policy::from_parts(meta, params, (vec![0.0; obs], vec![1.0; obs]), vec![0.0; act]).expect("lengths fit")
 }
 
-fn measured(id: &str, threads: usize) -> Obedience {
+fn measured(id: &str, threads: usize) -> CommandTracking {
     let options = EvalOptions { episodes: 20, seed: 3, threads };
     controller::measure(&policy(id), &options).unwrap_or_else(|e| panic!("{e}"))
 }

@@ -11,7 +11,7 @@ use crate::error::Error;
 ///
 /// # Panics
 /// If `sees` has the wrong length or an index beyond the inputs.
-pub fn graft(net: &Mlp, params: &mut [f32], small: &Mlp, of_small: &[f32], sees: &[usize]) -> Result<(), Error> {
+pub fn widen(net: &Mlp, params: &mut [f32], small: &Mlp, of_small: &[f32], sees: &[usize]) -> Result<(), Error> {
     let (sizes, others) = (net.sizes(), small.sizes());
     let hidden = |sizes: &[usize]| format!("{:?}", &sizes[1..sizes.len() - 1]);
     let wide = sizes.len() == others.len() && sizes[1..].iter().zip(&others[1..]).all(|(a, b)| a >= b);
@@ -55,17 +55,17 @@ mod tests {
         let (mut own, mut theirs) = (vec![0.0; large.len()], vec![0.0; small.len()]);
         orthogonal(&large, &mut own, 1.0, &mut random);
         orthogonal(&small, &mut theirs, 1.0, &mut random);
-        graft(&large, &mut own, &small, &theirs, &[4, 0, 2]).unwrap();
+        widen(&large, &mut own, &small, &theirs, &[4, 0, 2]).unwrap();
         let want = small.forward_row(&theirs, &[0.3, -1.2, 0.7]);
         let got = large.forward_row(&own, &[-1.2, 9.0, 0.7, 9.0, 0.3, 9.0]);
         assert!(want.iter().zip(&got).all(|(a, b)| (a - b).abs() < 1e-6), "{got:?}, expected {want:?}");
         // narrower networks and other numbers of layers are refused
         for sizes in [&[6, 4, 4, 2][..], &[6, 9, 2], &[6, 9, 4, 3]] {
             let net = Mlp::new(sizes, Activation::Tanh);
-            assert!(graft(&net, &mut vec![0.0; net.len()], &small, &theirs, &[4, 0, 2]).is_err(), "{sizes:?}");
+            assert!(widen(&net, &mut vec![0.0; net.len()], &small, &theirs, &[4, 0, 2]).is_err(), "{sizes:?}");
         }
         let relu = Mlp::new(&[6, 9, 4, 2], Activation::Relu);
-        let error = graft(&relu, &mut own, &small, &theirs, &[4, 0, 2]).unwrap_err().to_string();
+        let error = widen(&relu, &mut own, &small, &theirs, &[4, 0, 2]).unwrap_err().to_string();
         assert!(error.contains("activation") && error.contains("tanh") && error.contains("relu"), "{error}");
     }
 }
