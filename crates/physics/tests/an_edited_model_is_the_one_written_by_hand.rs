@@ -410,7 +410,8 @@ fn a_wrong_name_comes_with_the_nearest_one_and_changes_nothing() {
         &|s| s.replace("floor", Geom::sphere(1.0).set("siez", 1.0)).map(|_| ()),
         "arms.xml:8: <geom name=\"floor\"> has no attribute 'siez'; did you mean 'size'?",
     );
-    let doubled: [fn(&mut ModelSpec) -> Result<(), MjcfError>; 4] = [
+    type Edit = fn(&mut ModelSpec) -> Result<(), MjcfError>;
+    let doubled: [Edit; 4] = [
         |s| s.add_to("torso", Body::new("left")).map(|_| ()),
         |s| s.add_to("torso", Body::new("world")).map(|_| ()),
         |s| s.get_mut(Kind::Geom, "left")?.set("name", "right").map(|_| ()),
