@@ -7,8 +7,8 @@
 //! Others tell it what to do in its schedule's place: a program (`steer_an_agent.rs`), a trainer in Python (`own_player.rs`),
 //! a gamepad (`crates/bevy_marathon/examples/steer.rs`).
 
-use marathon_envs::{Agent, CommandRange, EpisodeRng, Facts, Motors, Obs, Part, Senses, Terms, Tolerance, names};
-use marathon_physics::lanes::Real;
+use marathon::envs::{Agent, CommandRange, EpisodeRng, Facts, Motors, Obs, Part, Senses, Terms, Tolerance, names};
+use marathon::physics::lanes::Real;
 
 const MODEL: &str = include_str!("rover.xml");
 

@@ -5,6 +5,7 @@ use marathon_envs::Value;
 use marathon_learn::{Control, EvalOptions, Evaluation, IterationStats, Policy};
 use marathon_physics::Isa;
 use marathon_runs::{Outcome, RunOptions, Session, Setting, Task};
+use std::fmt::Display;
 use std::path::PathBuf;
 
 /// Trains a policy for a task.
@@ -82,7 +83,13 @@ impl<'a> Trainer<'a> {
         self
     }
 
-    /// A configuration file in place of the task's own settings.
+    /// A setting of the configuration: `set("ppo.lr", 3e-4)`. `marathon config show TASK` prints all of them.
+    pub fn set(mut self, key: &str, value: impl Display) -> Self {
+        self.options.learn.set.push(format!("{key}={value}"));
+        self
+    }
+
+    /// A configuration file, whose settings replace those of the task.
     pub fn config(mut self, file: impl Into<PathBuf>) -> Self {
         self.options.learn.config = Some(file.into());
         self

@@ -52,5 +52,7 @@ fn what_does_not_exist_is_refused_with_the_nearest_name() {
     assert!(misspelled.contains("hoper") && misspelled.to_lowercase().contains("hopper-v0"), "{misspelled}");
     let wrong = error(Trainer::new("Hopper-v5").unwrap().option("ctrl_cost_wieght", 0.1).run());
     assert!(wrong.contains("ctrl_cost_weight"), "{wrong}");
+    let wrong = error(Trainer::new("hopper").unwrap().set("ppo.lrr", 1e-4).run());
+    assert!(wrong.contains("ppo.lrr") && wrong.contains("lr"), "{wrong}");
     assert!(error(Trainer::resume("no/such/run").run()).contains("no/such/run"));
 }
