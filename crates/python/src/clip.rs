@@ -11,6 +11,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::path::PathBuf;
 
+/// A function and its arguments, from which `pickle` makes an object again.
+type Reduced<'py> = (Bound<'py, PyAny>, (String, Bound<'py, PyBytes>));
+
 /// A motion clip as a value of the option `clip`.
 #[pyclass(frozen, eq, module = "marathon_envs")]
 #[derive(PartialEq)]
@@ -91,7 +94,7 @@ impl Clip {
     }
 
     /// For `copy` and `pickle`: the bytes of a file.
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String, Bound<'py, PyBytes>))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
         let make = py.import("marathon_envs._native")?.getattr("_clip")?;
         Ok((make, (self.name().into(), PyBytes::new(py, &self.clip().to_bytes()))))
     }
