@@ -13,6 +13,7 @@ mod ragdoll;
 #[path = "../examples/wear_a_skin.rs"]
 mod wear_a_skin;
 
+use bevy::app::Plugins;
 use bevy::log::LogPlugin;
 use bevy::prelude::*;
 use bevy::render::RenderPlugin;
