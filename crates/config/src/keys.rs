@@ -174,8 +174,7 @@ pub const KEYS: &[Key] = &[
         POSITIVE,
         "learning rate of the policy; `ppo`: where the adaptive schedule starts; `acktr`: largest step",
     ),
-    key(PPO, "value_lr", POSITIVE, "learning rate of the value function"),
-    key(SAC, "value_lr", POSITIVE, "learning rate of the value functions"),
+    key(&["ppo", "sac"], "value_lr", POSITIVE, "learning rate of the value function"),
     key(
         PPO,
         "lr_schedule",

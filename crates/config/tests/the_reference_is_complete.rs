@@ -32,11 +32,6 @@ fn every_field_of_the_configuration_is_a_key_and_every_key_a_field() {
         let novelty = [RewardKind::Curiosity(Novelty::default()), RewardKind::Rnd(Novelty::default())];
         let imitation = [gail, amp].map(RewardKind::Imitation);
         loaded.config.rewards.extend(novelty.into_iter().chain(imitation).map(RewardConfig::new));
-        // written only where it is used
-        loaded.config.run.policy_average = 0.1;
-        if let Algorithm::Ppo(ppo) = &mut loaded.config.algorithm {
-            ppo.value_warmup = 1;
-        }
         leaves(&loaded.document().into(), "", &mut fields);
     }
     assert_eq!(fields, keys().into_iter().collect());

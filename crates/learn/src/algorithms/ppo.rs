@@ -29,7 +29,6 @@ pub struct Ppo {
     pub value_lr: f64,
     /// Number of first rollouts that train only the value function. Without it, the advantages of an untrained value
     /// function would spoil a policy that starts from another one.
-    #[serde(skip_serializing_if = "is_zero")]
     pub value_warmup: u64,
     /// Schedule of the policy's learning rate.
     pub lr_schedule: LrSchedule,
@@ -125,11 +124,6 @@ impl Ppo {
     pub(super) fn memory_plan(&self, setup: &Setup<'_>) -> MemoryPlan {
         Layout::new(setup, self.ratio).memory_plan(setup.common.items().div_ceil(self.minibatches), 0)
     }
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
-fn is_zero(n: &u64) -> bool {
-    *n == 0
 }
 
 /// PPO with the state of its optimizer.

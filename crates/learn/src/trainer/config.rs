@@ -187,7 +187,6 @@ pub struct RunConfig {
     pub total_steps: u64,
     /// Latest part of the run so far whose policies are averaged for the one that the run hands out, as a share of its steps,
     /// from 0 to below 1; 0: the last policy alone.
-    #[serde(skip_serializing_if = "is_zero")]
     pub policy_average: f64,
     /// Seed of everything random.
     pub seed: u64,
@@ -207,11 +206,6 @@ impl Default for RunConfig {
             threads: 0,
         }
     }
-}
-
-/// Whether a setting is off. Files leave it out then.
-fn is_zero(x: &f64) -> bool {
-    *x == 0.0
 }
 
 impl TrainConfig {
