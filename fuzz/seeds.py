@@ -125,11 +125,8 @@ def mappings():
 def train(folder):
     """Train a small policy with each algorithm in a folder of its own, if there is the program."""
     for algorithm in ["ppo", "a2c", "acktr", "sac"] if PROGRAM.exists() else []:
-        config = folder / f"{algorithm}.yaml"
-        network = "{hidden_units: 4, num_layers: 1}"
-        settings = f"trainer_type: {algorithm}, network_settings: {network}, max_steps: 640, marathon: {{agents: 16}}"
-        config.write_text(f"behaviors: {{Hopper: {{{settings}}}}}\n")
-        words = ["train", "hopper", "--config", config, "--threads", "1", "--out", folder / algorithm]
+        words = ["train", "hopper", "--algo", algorithm, "--agents", "16", "--steps", "640", "--threads", "1"]
+        words += ["--set", "network.hidden=[4]", "--out", folder / algorithm]
         subprocess.run([PROGRAM, *words], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 

@@ -43,7 +43,10 @@ fn every_component_that_an_app_spawns_is_registered() {
 fn a_field_that_is_edited_by_its_path_changes_the_component() {
     let mut app = common::app(Duration::from_millis(10));
     let ragdoll = app.world_mut().spawn((Ragdoll::agent("hopper"), Restart::default())).id();
-    app.update();
+    // a character joins the simulation within its first frames
+    while app.world().get::<Anatomy>(ragdoll).is_none() {
+        app.update();
+    }
     let model = app.world().get::<Anatomy>(ragdoll).expect("it is simulated").model.clone();
     app.world_mut().entity_mut(ragdoll).insert(Physique(Variation::none(&model)));
     let mut restart = app.world_mut().get_mut::<Restart>(ragdoll).expect("it was spawned");
