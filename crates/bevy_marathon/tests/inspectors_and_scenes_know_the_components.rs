@@ -1,5 +1,5 @@
-//! Inspectors and scenes read and write components through reflection: each component that an app spawns is registered, and one that
-//! was written as plain data becomes a component again.
+//! Inspectors and scenes read and write components through reflection. Each component that an app spawns is registered. Plain data
+//! becomes a component.
 
 #[allow(dead_code, reason = "a part of it is enough")]
 mod common;
