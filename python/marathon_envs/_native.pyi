@@ -453,7 +453,7 @@ def train(
         out: a new folder for everything that the command ``marathon train`` writes; None means that nothing is written.
         resume: the folder of a run to go on with, in place of a configuration; the task is needed for a class alone.
         players: an object that has the rollouts played elsewhere, as `marathon_envs.ray.Workers` does.
-        options: arguments of a task with a name, such as ``{"clip": "my.bvh"}``. A clip may also be a `Clip`, or a list.
+        options: arguments of a task with a name, such as ``{"clip": "my.bvh"}``. A clip may be a `Clip` or a list, too.
         initialize_from: a policy to start from in place of random weights, a file or the folder of a run, whose hidden
             layers are no wider; it may observe less.
     """

@@ -52,7 +52,7 @@ def test_a_clip_is_a_value(tmp_path: Path) -> None:
     shipped = Clip.load(WALK)
     mine = Clip(model, shipped.qpos, shipped.dt, name="mine", cycle=shipped.cycle)
     assert (mine.name, mine.duration) == ("mine.motion", shipped.duration)
-    assert mine == mine and mine != shipped
+    assert mine != shipped
     mine.save(tmp_path / "mine.motion")
     assert Clip.load(tmp_path / "mine.motion") == mine == pickle.loads(pickle.dumps(mine))  # noqa: S301
     with pytest.raises(ValueError, match="frames: found 1, expected two or more"):

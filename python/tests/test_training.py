@@ -74,7 +74,7 @@ def test_configurations() -> None:
     assert config["ppo"]["action_std"]["min"] == {"from": 0.42, "to": 0.01}
     result = train("hopper", ROOT / "assets/configs/hopper-fast.yaml", steps=100, agents=16)
     assert result.policy.meta["hidden"] == [32, 32]
-    with pytest.raises(ValueError, match="config: ppo.epoch: unknown key; did you mean 'epochs'"):
+    with pytest.raises(ValueError, match=r"config: ppo\.epoch: unknown key; did you mean 'epochs'"):
         train("hopper", {"ppo": {"epoch": 2}})
 
 
