@@ -1,4 +1,4 @@
-//! The clip range moves linearly from `clip` to `final_clip` over the run's steps, also across an interruption.
+//! The clip range moves linearly from `clip.from` to `clip.to` over the run's steps, also across an interruption.
 
 mod common;
 
@@ -59,7 +59,7 @@ fn an_interruption_does_not_move_the_range() {
 fn the_end_must_be_positive() {
     for bad in [0.0, -0.1, f64::NAN, f64::INFINITY] {
         let error = config(2, 0.2, Some(bad)).validate().unwrap_err().to_string();
-        assert!(error.contains("final_clip is") && error.contains("expected a positive number"), "{error}");
+        assert!(error.contains("ppo.clip.to is") && error.contains("expected a positive number"), "{error}");
     }
     config(2, 0.2, Some(0.1)).validate().unwrap();
 }

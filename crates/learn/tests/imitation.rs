@@ -248,8 +248,8 @@ fn what_cannot_be_imitated_is_refused() {
         assert!(error.contains(message), "{error}");
     };
     let whole = Unrewarded::new(20);
-    refused(&whole, |i| i.share = 0.0, "rewards: share is 0, expected a number above 0 and at most 1");
-    refused(&whole, |i| i.gradient_penalty = -1.0, "rewards: gradient_penalty is -1, expected a number not below 0");
+    refused(&whole, |i| i.share = 0.0, "rewards.amp.share is 0, expected a number above 0 and at most 1");
+    refused(&whole, |i| i.gradient_penalty = -1.0, "rewards.amp.gradient_penalty is -1, expected a number not below 0");
     refused(
         &whole,
         |i| i.observations = vec!["velocty".into()],
