@@ -206,7 +206,11 @@ fn what_is_wrong_is_told() -> Result<(), Box<dyn Error>> {
         (&["MarathonMan", "--mapping", "wrong.json"], 2, &["--skin"]),
         (&["\u{1b}[31mhopper"], 1, &["\\u{1b}[31mhopper"]),
         (&["MarathonMan", "--skin", "half.glb", "--record", "a.png"], 1, &["half.glb cannot be worn"]),
-        (&["hopper", "--skin", "marathon_man", "--record", "a.png"], 1, &["no built-in mapping", "marathon_man, humanoid"]),
+        (
+            &["hopper", "--skin", "marathon_man", "--record", "a.png"],
+            1,
+            &["no built-in mapping", "marathon_man, humanoid"],
+        ),
         (&["hopper", "--agents", "0"], 2, &["--agents"]),
         (&["hopper", "--action", "1:thorw"], 2, &["--action", "did you mean 'throw'"]),
         (&["hopper", "--record", "a.mov"], 1, &["a.mov", "mp4"]),

@@ -253,7 +253,7 @@ fn what_cannot_be_imitated_is_refused() {
     refused(
         &whole,
         |i| i.observations = vec!["velocty".into()],
-        "rewards: observations is 'velocty', expected parts of Puck-v0's observation: 'velocity', or another of position",
+        "rewards.amp.observations is 'velocty', expected parts of Puck-v0's observation: 'velocity', or another of position",
     );
     let with = |change: fn(&mut Demonstrations)| {
         let mut task = Unrewarded::new(20);
