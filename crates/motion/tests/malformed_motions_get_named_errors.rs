@@ -180,7 +180,7 @@ fn of_bvh() {
         ("3 Xposition Yposition Z", "3 Xposition Zrotation Z", "m.bvh:5:"),
         ("  JOINT", "  JOIN", "m.bvh:6:3: found \"JOIN\", expected OFFSET, CHANNELS, JOINT, End Site or }"),
         ("Frames: 2", "Frames: 3", "m.bvh: frame 2: the file ends; expected 3 frames"),
-        ("Frames: 2", "Frames: 0", "m.bvh:17:9: found 0 frames, expected two or more"),
+        ("Frames: 2", "Frames: 0", "m.bvh:17:9: found 0 frames, expected a whole number from 2 to 1e7"),
         ("Frames: 2", "Frame: 2", "m.bvh:17:1: found \"Frame:\", expected Frames:"),
         ("0 90 0 5", "0 90 0 nan", "m.bvh:20:8: found \"nan\", expected a number"),
         ("0 90 0 5\n", "0 90 0 5\n7", "m.bvh:21:"),
