@@ -20,14 +20,14 @@ const BEHIND: f64 = 2.0;
 const GRID: f64 = 0.1;
 /// Half the width of the field, m.
 const HALF_WIDTH: f64 = 30.0;
-/// What lies below this is the level ground, m: two surfaces at one height would both carry.
+/// Depth of the field's zero level below the level ground, m: two surfaces at the same height would both carry.
 const SUNK: f64 = 0.01;
 
 /// Half the width of a [`Ground::Track`], and its thickness below the start's height, m.
 pub const TRACK_HALF_WIDTH: f64 = 8.0;
 const TRACK_BASE: f64 = 8.0;
 
-/// What a track is like.
+/// Shape of a track.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, bevy::reflect::Reflect)]
 pub enum Ground {
     /// As in training.
@@ -45,7 +45,7 @@ pub enum Ground {
 }
 
 impl Ground {
-    /// Those that have a shape of their own.
+    /// All shapes except [`Ground::Track`], which [`LaidGround`](crate::LaidGround) shapes.
     pub const ALL: [Ground; 4] = [Ground::Level, Ground::Hills, Ground::Stairs, Ground::Boards];
 
     /// What it is called on the screen, on the command line and in recordings.

@@ -25,7 +25,7 @@ pub struct Ragdoll {
     pub seed: u64,
     /// Which of the seed's agents it is: `marathon eval --seed S` plays the agents 0, 1, 2 ... of seed S.
     pub number: u64,
-    /// What an agent runs on; a prefab brings its own.
+    /// Ground under an agent; a prefab brings its own.
     pub ground: Ground,
     /// An agent's task with its arguments and clips. `None`: what its [`CharacterPolicy`] notes when the ragdoll enters the simulation,
     /// which waits for a policy that is still being loaded; without a policy, the defaults. Scenes do not keep it.
@@ -77,7 +77,7 @@ impl Ragdoll {
     }
 }
 
-/// What decides for a [`Ragdoll`] that is an agent. When the asset changes, the next decision is the new policy's.
+/// Policy of a [`Ragdoll`] that is an agent. When the asset changes, the new policy computes the next action.
 #[derive(Component, Clone, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Component, Clone, Debug, PartialEq)]
 pub struct CharacterPolicy(pub Handle<PolicyAsset>);
@@ -195,7 +195,7 @@ pub struct Episode {
     pub untimed: bool,
 }
 
-/// What a [`Ragdoll`] is made of. Added by the plugin when the ragdoll has entered the simulation.
+/// Model and parts of a [`Ragdoll`]. The plugin adds it when the ragdoll has entered the simulation.
 #[derive(Component, Clone, Debug)]
 pub struct Anatomy {
     /// The compiled model.

@@ -25,7 +25,7 @@ fn play(agent: &str, policy: Net, frame: Duration, order: impl Fn(usize) -> usiz
     let mut ragdolls = [Entity::PLACEHOLDER; EPISODES];
     for i in 0..EPISODES {
         let number = order(i);
-        // somebody else in between
+        // another character in between
         if i % 3 == 0 {
             app.world_mut().spawn(Ragdoll::agent(agent).with_seed(99, i as u64));
         }
@@ -92,7 +92,7 @@ fn in_the_task_that_the_policy_notes() {
     assert_eq!(policy.meta().options.get("clip"), setting.options.get("clip"));
     let eval = measure(&setting, &policy);
     compare("MarathonMan", &eval, &play("MarathonMan", policy.clone(), Duration::from_millis(40), |i| i));
-    // the file is not needed, and what somebody says goes before what the policy notes
+    // the file is not needed, and explicit options take precedence over those that the policy notes
     drop(folder);
     let other = setting.overlaid(&Setting { options: Options::new().with("start", "random"), ..plain });
     assert_ne!(measure(&other, &policy).length_mean, eval.length_mean);

@@ -100,7 +100,7 @@ pub struct TrainArgs {
     pub run: RunOptions,
 }
 
-/// What `config` does.
+/// Subcommands of `config`.
 #[derive(Debug, Subcommand)]
 pub enum ConfigCommand {
     /// Print all settings of a task as YAML: its preset, or what a file and `--set` make of it.
@@ -294,7 +294,7 @@ pub struct RecordDemoArgs {
 #[derive(Debug, clap::Args)]
 #[command(disable_help_flag = true)]
 pub struct PlayArgs {
-    /// What the game is told, such as `humanoid --agents 16`; `marathon play --help` is the game's own help.
+    /// Arguments for the game, such as `humanoid --agents 16`; `marathon play --help` prints the game's help.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "WORDS")]
     pub words: Vec<std::ffi::OsString>,
 }

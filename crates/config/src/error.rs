@@ -1,4 +1,4 @@
-//! What can be wrong with a configuration file.
+//! Errors of configuration files.
 
 use marathon_physics::hint::{did_you_mean, nearest};
 use std::fmt;
@@ -63,7 +63,7 @@ pub enum ConfigError {
         place: Place,
         /// Its value.
         found: String,
-        /// What would do.
+        /// Values that the key accepts.
         expected: String,
     },
     /// A feature of ML-Agents that Marathon does not have.
@@ -75,7 +75,7 @@ pub enum ConfigError {
         feature: &'static str,
         /// The value.
         found: String,
-        /// What makes the file usable.
+        /// A change that makes the file usable.
         expected: String,
     },
     /// The file says nothing about an agent.

@@ -10,7 +10,7 @@ const MOST: u64 = 1 << 31;
 /// Most steps of a run.
 const MOST_STEPS: u64 = 1 << 53;
 
-/// What a key may be.
+/// Type of a key's value.
 #[derive(Clone, Copy, Debug)]
 pub enum Kind {
     /// A whole number within bounds.

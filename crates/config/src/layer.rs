@@ -27,7 +27,7 @@ pub struct Layer {
     places: BTreeMap<String, Place>,
 }
 
-/// What a file says: settings for all its tasks, and those of some.
+/// Contents of a file: settings for all its tasks, and settings for single tasks.
 #[derive(Clone, Debug)]
 pub struct File {
     shared: Layer,
@@ -77,7 +77,7 @@ impl File {
     }
 }
 
-/// What a section speaks of.
+/// Scope of a section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Part {
     File,
@@ -85,7 +85,7 @@ enum Part {
     Role,
 }
 
-/// What may stand at the top of a part.
+/// Keys that are allowed at the top of a part.
 fn names(part: Part) -> Vec<&'static str> {
     let mut names = keys::names_in("", part == Part::Role);
     names.extend(match part {

@@ -1,4 +1,4 @@
-//! What a configuration has led to: the trainer's settings and the run's.
+//! Result of loading a configuration: the settings of the trainer and of the run.
 
 use super::error::ConfigError;
 use super::layer::{Layer, OPTIONS, overlay};
@@ -8,7 +8,7 @@ use marathon_learn::{Error, TrainConfig};
 use serde_json::{Map as Object, Value as Json};
 use std::path::Path;
 
-/// What a configuration says about the training of an agent.
+/// Training settings of an agent from a configuration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
     /// The trainer's configuration; it is valid.

@@ -10,13 +10,13 @@ use super::presets::default_for;
 use serde_json::{Map as Object, Value as Json};
 use std::path::Path;
 
-/// Reads what the bytes of a file say about a task, which may go by any of its names; the path is for messages. What a
-/// file of Marathon's leaves out, the task's preset says, unless the file has `preset: false`. A file of ML-Agents has
-/// ML-Agents' defaults.
+/// Reads the settings of a task from the bytes of a file. Any name of the task works; the path is for messages. In a file
+/// of Marathon's, missing settings come from the task's preset, unless the file has `preset: false`. A file of ML-Agents
+/// has ML-Agents' defaults.
 ///
 /// # Errors
-/// If the file is no configuration, says nothing about the task, or asks for what there is not. Messages name file, line and
-/// key, what was found and what was expected.
+/// If the file is no configuration, has no settings for the task, or uses unsupported features. Messages name file, line
+/// and key, the value found and the value expected.
 pub fn parse(path: &Path, bytes: &[u8], task: &str) -> Result<Loaded, ConfigError> {
     read(path, &document::parse(path, bytes)?, task)
 }

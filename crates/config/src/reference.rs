@@ -71,7 +71,7 @@ fn cell(key: &Key, section: &str) -> String {
     }
 }
 
-/// What an algorithm starts from, with all rewards.
+/// Defaults of an algorithm, with all rewards.
 fn all_of(algorithm: &str) -> Map<String, Value> {
     let mut loaded = default_of(algorithm);
     let imitation = |form| RewardKind::Imitation(Imitation { form, ..Default::default() });

@@ -126,7 +126,7 @@ impl<'a> Section<'a> {
     }
 }
 
-/// What a number must be.
+/// Allowed range of a number.
 #[derive(Clone, Copy, Debug)]
 pub enum Range {
     /// Above zero.

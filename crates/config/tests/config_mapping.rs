@@ -392,6 +392,6 @@ fn every_agent_has_a_valid_default() {
     // and so have dm_control's
     assert_eq!(default_for("dm_control/walker-walk-v0"), default_for("walker-walk"));
     assert_ne!(default_for("walker-walk").config, default_for("walker").config);
-    // an agent of somebody else's
+    // an agent from another crate
     assert_eq!(default_for("MyRobot-v3"), Loaded::default());
 }

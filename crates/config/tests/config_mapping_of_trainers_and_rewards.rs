@@ -148,7 +148,7 @@ behaviors:
     assert_eq!((defaults.algorithm, defaults.run.agents), (Algorithm::Sac(sac), 16));
 }
 
-/// What means nothing to the trainer of a file is noted.
+/// Settings without a meaning for the file's trainer lead to a note.
 #[test]
 fn settings_of_another_trainer_are_noted() {
     let text = "

@@ -20,7 +20,7 @@ const FRAME: Duration = Duration::from_nanos(16_666_667);
 const DT: f64 = 1.0 / 60.0;
 /// Seconds of the Ant's decision.
 const DECISION: f64 = 0.01;
-/// What it is told, m/s, and most frames that it gets for that.
+/// Commanded speed, m/s, and the most frames until it is reached.
 const FULL: f64 = 3.0;
 const PATIENCE: usize = 180;
 
@@ -34,7 +34,7 @@ enum Device {
 fn latency(device: Device, words: &[&str]) -> [f64; 2] {
     let mut app = windowless::game(&[&["AntController", "--agents", "1"], words].concat(), FRAME, |_| ());
     let pad = pad(&mut app);
-    // who is told something once stays under command, and then stands
+    // after its first command the character stays under command, and stands without input
     push(&mut app, pad, GamepadAxis::LeftStickY, 1.0);
     push(&mut app, pad, GamepadAxis::LeftStickY, 0.0);
     frames(&mut app, 240);

@@ -1,5 +1,5 @@
-//! Assault courses in the game: a policy runs, a player leads a runner, or builds the ground ahead of one by mouse and keys. What
-//! has ended enters the table of the longest runs, and its replay is the run to the bit, ground included.
+//! Assault courses in the game: a policy runs, a player leads a runner, or builds the ground ahead of one by mouse and keys.
+//! Finished runs enter the table of the longest runs, and their replays match them bit for bit, ground included.
 
 #[path = "common/windowless.rs"]
 mod windowless;
@@ -25,7 +25,7 @@ use windowless::frames;
 const FROM: f64 = -6.0;
 const CELL: f64 = 0.1;
 
-/// The game on a course, with a window that nobody draws.
+/// The game on a course, with a window that is never drawn.
 fn game(table: &Path, words: &[&str]) -> App {
     let table = table.display().to_string();
     let words = [&["--table", &table, "--player", "Ada"], words].concat();
@@ -149,7 +149,7 @@ fn the_replay_of_a_run_on_a_builders_course_is_the_run_to_the_bit() -> Result<()
     assert!(same + 2 >= recording.frames(), "{same} of {} frames", recording.frames());
     assert!(lies > 3, "the ground has changed {lies} times");
 
-    // whoever plays the recorded actions in the environment has the same run
+    // the recorded actions give the same run in the environment
     let options = VecEnvOptions { agents: 1, autoreset: Autoreset::Disabled, ..VecEnvOptions::default() };
     let mut env = recording.setting.vec_env(&options)?;
     let mut out = env.buffers();

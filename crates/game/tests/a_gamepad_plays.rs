@@ -19,7 +19,7 @@ fn app() -> (App, Entity) {
         done.0.extend(actions.read().map(|d| d.0));
     });
     app.update();
-    // whoever runs the tests may have keys of their own
+    // the user that runs the tests may have changed the key bindings
     app.insert_resource(Bindings::default());
     let pad = devices::pad(&mut app);
     (app, pad)

@@ -38,7 +38,7 @@ fn game_of(agent: &str, words: &[&str]) -> App {
     windowless::game(&[&[agent], words].concat(), FRAME, |_| ())
 }
 
-/// What the actors are told, in their order.
+/// Commands of the actors, in their order.
 fn commands(app: &mut App) -> Vec<(f64, bool)> {
     let mut query = app.world_mut().query::<(&Actor, &Episode, &AgentCommand)>();
     let mut all: Vec<_> =

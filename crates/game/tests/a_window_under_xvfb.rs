@@ -29,7 +29,7 @@ fn start(command: &mut Command) -> Result<Running, Box<dyn Error>> {
     Ok(Running(child))
 }
 
-/// The screen: a display that nobody else has.
+/// The screen: a display for this test alone.
 fn screen() -> Result<(Running, String), Box<dyn Error>> {
     static SCREENS: AtomicU32 = AtomicU32::new(0);
     let display = format!(":{}", 200 + 2 * (std::process::id() % 300) + SCREENS.fetch_add(1, Ordering::Relaxed));

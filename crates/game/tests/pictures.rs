@@ -33,7 +33,7 @@ fn draw(folder: &Path, name: &str, more: &[&str]) -> Result<Image, Box<dyn Error
         String::from_utf8_lossy(&output.stderr)
     );
     let image = read(&folder.join(name))?;
-    // kept for whoever looks at the results of a run of the tests
+    // kept so that you can look at it after the test run
     image.save_png(Path::new(env!("CARGO_TARGET_TMPDIR")).join(name))?;
     Ok(image)
 }

@@ -350,7 +350,7 @@ fn worst_part(app: &mut App) -> Option<(f32, LinearRgba)> {
 
 #[test]
 fn parts_near_their_clip_are_green_and_far_ones_red() -> Result<(), Box<dyn std::error::Error>> {
-    // nobody keeps it on its feet
+    // no policy keeps the character on its feet
     let mut app = app(&["MarathonMan", "--mode", "imitate", "--option", "clip=run", "--option", "start=first"]);
     let mut seen = [0, 0];
     for _ in 0..300 {

@@ -52,7 +52,7 @@ pub use trainer::{Trainer, evaluate};
 /// The result of a function of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// What most programs use.
+/// The items that most programs use.
 pub mod prelude {
     pub use crate::{
         Control, EvalOptions, Evaluation, IterationStats, Model, Options, Outcome, Policy, Step, Trainer, VecEnv,

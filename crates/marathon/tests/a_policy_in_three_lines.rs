@@ -1,4 +1,4 @@
-//! The builder trains what the command trains, writes only where it is told to, and refuses what does not exist.
+//! The builder trains the same policies as the command, writes only to given paths, and refuses unknown names.
 
 use marathon::prelude::*;
 

@@ -1,4 +1,4 @@
-//! What one exchange of 16 hoppers costs the player: `cargo bench --workspace --bench exchange`.
+//! Cost of one exchange of 16 hoppers for the player: `cargo bench --workspace --bench exchange`.
 //!
 //! Processor time of the player's thread, the kernel's share included: reading and decoding the actions, the simulation,
 //! encoding and sending the infos. The trainer is another thread that always answers the same.

@@ -207,7 +207,7 @@ pub fn rows<'a, T: Element + Copy>(array: &'a PyReadonlyArray2<'_, T>) -> Cow<'a
     }
 }
 
-/// What `value` is as an array of this shape; `name` with its verb is for the error if it is none.
+/// Reads `value` as an array of this shape; the error starts with `name`, which includes its verb.
 pub fn of_shape<'py, T, D, const N: usize>(
     name: &str,
     value: &Bound<'py, PyAny>,

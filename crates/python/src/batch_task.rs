@@ -116,7 +116,7 @@ fn metrics(names: &Bound<'_, PyAny>, info: &Bound<'_, PyAny>) -> PyResult<Vec<Me
     Ok(names.into_iter().map(|name| Metric { source: source(&name), name }).collect())
 }
 
-/// What agents can be told to do.
+/// Ranges of the agents' commands.
 fn commands(ranges: &Bound<'_, PyAny>) -> PyResult<Vec<CommandRange>> {
     let mut out = Vec::new();
     for range in ranges.try_iter()? {

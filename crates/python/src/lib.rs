@@ -1,7 +1,7 @@
 //! The native module `marathon_envs._native` of the Python package: environments stepped without the GIL on NumPy arrays
 //! that are not copied, and the `marathon` command.
 //!
-//! What Python programmers see is documented in `python/marathon_envs`, this module's classes in its `_native.pyi` too.
+//! `python/marathon_envs` documents the Python API; its `_native.pyi` also documents this module's classes.
 //! Nothing here knows of Gymnasium or another framework.
 
 mod arrays;

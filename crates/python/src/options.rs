@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyString};
 use std::path::PathBuf;
 
-/// What Python gives for an argument.
+/// Python value of an argument.
 #[derive(FromPyObject)]
 enum Given {
     #[pyo3(transparent)]

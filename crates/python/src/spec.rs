@@ -89,7 +89,7 @@ pub struct Spec {
     pub metrics: Vec<String>,
     /// Names of the observation's parts, and where they begin and end.
     observations: Vec<marathon_envs::ObsGroup>,
-    /// What agents can be told to do, see `VecEnv.set_command`.
+    /// Commands of the agents, see `VecEnv.set_command`.
     pub command: Vec<CommandRange>,
     /// Length of `qpos`.
     #[pyo3(get)]
@@ -119,7 +119,7 @@ impl Spec {
         Ok(parts)
     }
 
-    /// What agents can be told to do, a number each, see `VecEnv.set_command`.
+    /// Commands of the agents, a number each, see `VecEnv.set_command`.
     #[getter]
     fn command(&self) -> Vec<CommandRange> {
         self.command.clone()

@@ -1,4 +1,4 @@
-//! What stands for a task in Python: its name, or an agent that is written in Python.
+//! A task in Python: its name, or an agent that is written in Python.
 
 use crate::{batch_task, error};
 use marathon_envs::{BatchAdapter, ShardFactory, Spec, registry};
@@ -28,7 +28,7 @@ pub fn plain(name: &str) -> &str {
     name.strip_prefix(NAMESPACE).unwrap_or(name)
 }
 
-/// What became of an agent that a run was begun with.
+/// Batch task of the Python agent that a run was started with, or the error.
 #[derive(Default)]
 pub struct Made {
     pub batch_task: Option<Arc<BatchAdapter>>,

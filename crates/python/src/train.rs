@@ -34,7 +34,7 @@ fn config(value: &Bound<'_, PyAny>) -> PyResult<Option<Config>> {
     })
 }
 
-/// What a run has led to.
+/// Result of a run.
 #[pyclass(frozen, module = "marathon_envs")]
 pub struct TrainResult {
     /// The policy.

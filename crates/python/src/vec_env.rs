@@ -171,9 +171,9 @@ impl VecEnv {
 
     /// Starts new episodes and returns the observations, `(num_envs, obs_size)`.
     ///
-    /// A seed starts the random streams anew: the same seed, the same lives. A sequence has a seed, or `None`, for each
-    /// agent, which then lives as the only agent of an environment with that seed. With a mask, `(num_envs,)`, all of this
-    /// is about the chosen agents alone.
+    /// A seed restarts the random streams: the same seed gives the same episodes. A sequence has a seed, or `None`, for each
+    /// agent, which then acts as the only agent of an environment with that seed. With a mask, `(num_envs,)`, only the chosen
+    /// agents are reset.
     #[pyo3(signature = (seed = None, mask = None))]
     fn reset(
         &mut self,
@@ -332,7 +332,7 @@ impl VecEnv {
         Ok(())
     }
 
-    /// What each agent was told by the observation that it has, `(num_envs, len(spec.command))`, a new array.
+    /// Command in each agent's current observation, `(num_envs, len(spec.command))`, a new array.
     #[getter]
     fn command<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (n, columns) = (self.num_envs, self.spec.get().command.len());

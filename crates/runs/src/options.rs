@@ -1,5 +1,5 @@
-//! What runs, policies and films are told: plain structs that every front end fills. The feature `clap` makes them arguments
-//! of a command line, with these texts as its help.
+//! Options of runs, policies and films: plain structs that every front end fills. The feature `clap` makes them command-line
+//! arguments, with these texts as the help.
 
 use crate::error::RunError;
 use crate::policy_file;
@@ -34,7 +34,7 @@ pub struct LearnOptions {
     pub threads: Option<usize>,
 }
 
-/// What a training run is told. What is left out, the configuration says.
+/// Options of a training run. The configuration supplies options that are left out.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct RunOptions {

@@ -69,7 +69,7 @@ impl Setting {
         Setting { agent: task_of_role(&policy.agent).into(), options: policy.options.clone() }
     }
 
-    /// The same with episodes that start as they do for whoever plays, if the agent can start elsewhere.
+    /// The same with the option `start` set to `first`, if the agent has this option.
     ///
     /// # Errors
     /// If there is no such agent.

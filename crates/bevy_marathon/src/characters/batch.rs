@@ -13,7 +13,7 @@ use marathon_physics::{Batch, BatchOptions, Model, Variation};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What steps sixteen ragdolls.
+/// Steps sixteen ragdolls.
 enum Engine {
     /// With a task.
     Env(Box<VecEnv>),
@@ -33,7 +33,7 @@ pub(crate) struct CharacterBatch {
     action: Vec<f32>,
     /// Their last actions, with which roles go on that do not decide now.
     last: Vec<f32>,
-    /// What a role sees, and what it chooses.
+    /// Buffers for a role's observations and actions.
     seen: Vec<f32>,
     scratch: Vec<f32>,
     /// The policies of the lanes, each with the number of its role.

@@ -13,7 +13,7 @@ use marathon_physics::Model;
 use marathon_physics::model::{Geom, GeomType, HField, JointType};
 use std::collections::BTreeMap;
 
-/// MuJoCo's default color, which says that nobody chose one.
+/// MuJoCo's default color: the model sets none.
 const UNCHOSEN: [f32; 4] = [0.5, 0.5, 0.5, 1.0];
 /// Geom groups from here on are hidden by MuJoCo's viewer unless asked for.
 const FIRST_HIDDEN_GROUP: i32 = 3;
@@ -76,7 +76,7 @@ pub(crate) struct Wardrobe {
     soil: Option<Handle<StandardMaterial>>,
 }
 
-/// What a surface is made of.
+/// Material of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Stuff {
     color: [f32; 3],
@@ -319,7 +319,7 @@ fn terrain(field: &HField, own: Option<&[f32]>, place: Vec3) -> Mesh {
         }
     }
     let (mut positions, mut checker) = (positions, checker);
-    // its sides, seen from outside: without them, nobody sees where a narrow track is high
+    // its sides, seen from outside: without them, you cannot see where a narrow track is high
     for (row, seen_from_front) in [(0, true), (rows.saturating_sub(1), false)] {
         let first = positions.len() as u32;
         for column in 0..columns {

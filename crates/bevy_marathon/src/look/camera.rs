@@ -11,7 +11,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 const EASE: [f32; 2] = [0.18, 0.55];
 /// The same for turns and zoom.
 const EASE_TURN: f32 = 0.15;
-/// Speed that it reckons with at most, m/s.
+/// Speed of the target, m/s, up to which the camera looks ahead.
 const FASTEST: f32 = 12.0;
 /// Radians per second of [`CameraMode::Orbit`].
 const ORBIT_SPEED: f32 = 0.25;
@@ -119,7 +119,7 @@ impl Default for FollowCamera {
 }
 
 impl FollowCamera {
-    /// A camera that follows somebody.
+    /// A camera that follows an entity.
     pub fn following(target: Entity) -> Self {
         FollowCamera { target: Some(target), ..default() }
     }

@@ -1,4 +1,4 @@
-//! Marks for those who want to know: contacts and their forces, joints and their limits, axes, targets, and what one is told.
+//! Debug marks: contacts and their forces, joints and their limits, axes, targets, and commands.
 
 use crate::axes::to_game;
 use crate::look::joint_places;
@@ -57,7 +57,7 @@ pub struct Marks {
     pub joints: bool,
     /// A ring around it on the ground.
     pub ring: bool,
-    /// The velocity that it is told to have, beside its own, and how far it is to turn in half a second: on the ground.
+    /// The commanded and the actual velocity, and the commanded turn in half a second, on the ground.
     pub command: bool,
 }
 

@@ -1,5 +1,5 @@
-//! What ragdolls and their world look like: meshes and materials, ground, sky and sun, a camera that follows, marks for
-//! contacts and joints. Every part is a plugin of its own; take what your game lacks.
+//! Appearance of ragdolls and their world: meshes and materials, ground, sky and sun, a camera that follows, marks for
+//! contacts and joints. Every part is a separate plugin; add those that your game lacks.
 
 mod body;
 mod camera;

@@ -42,7 +42,7 @@ impl Plugin for SceneryPlugin {
     }
 }
 
-/// What stays around the camera.
+/// Scenery that stays around the camera.
 #[derive(Component, Default)]
 struct Around {
     /// Sideways in steps of this, so that textures stand still.

@@ -19,7 +19,7 @@ pub enum Format {
 /// Settings of one agent, by topic. In the old format the first three are the same section.
 pub struct Behavior<'a> {
     pub format: Format,
-    /// What holds where the file is silent; it knows the trainer.
+    /// Defaults for keys that the file leaves out; they depend on the trainer.
     pub base: TrainConfig,
     /// Settings that stand in no section.
     pub top: Section<'a>,

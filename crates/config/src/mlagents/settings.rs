@@ -1,4 +1,4 @@
-//! What ML-Agents' own keys say, and its defaults for what they leave out.
+//! Settings from ML-Agents' own keys, with ML-Agents' defaults for missing keys.
 
 use super::behavior::{Behavior, Format};
 use crate::error::ConfigError;

@@ -3,7 +3,7 @@
 use marathon_config::{Loaded, parse};
 use std::path::Path;
 
-/// What a file says about an agent.
+/// Settings of an agent from a file's text.
 pub fn read(text: &str, agent: &str) -> Loaded {
     parse(Path::new("test.yaml"), text.as_bytes(), agent).unwrap_or_else(|e| panic!("{e}"))
 }

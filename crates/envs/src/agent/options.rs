@@ -1,8 +1,8 @@
 //! Named arguments of agents: `ctrl_cost_weight = 0.01`, `healthy_z_range = (0.8, 2)`.
 //!
 //! An agent that takes arguments is a struct declared with [`options!`](crate::options!): one list says the names, types,
-//! defaults and what they mean, and [`Agent::options`](crate::Agent::options) shows it to everybody who makes
-//! environments by name. Who gives a name that is not in the list is told the nearest one that is.
+//! defaults and meanings, and [`Agent::options`](crate::Agent::options) returns it to code that makes environments by
+//! name. The error for an unknown name suggests the nearest one in the list.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use marathon_physics::budget::FILM_SECONDS;
 pub use super::clips::{Clips, NamedClip};
 pub use super::value::Value;
 
-/// Arguments that help to learn: whoever plays a policy has their defaults, whatever it learned with.
+/// Arguments that only help training: outside of training, policies run with their defaults.
 pub const OF_LEARNING: [&str; 3] = ["mortal", "knocked", "relive"];
 
 /// Arguments by name, in the order in which they were given. Equal ones may have been given in another order.
@@ -297,8 +297,8 @@ pub trait OptionSet: Clone {
     /// Sets one by name; `false` if there is none of this name or its type does not fit.
     fn put(&mut self, name: &str, value: &Value) -> bool;
 
-    /// The same with some arguments set. Those that do not exist or do not fit are left alone; the registry refuses them
-    /// before it comes to this.
+    /// The same with some arguments set. Unknown names and values of the wrong type are ignored; the registry refuses them
+    /// earlier.
     fn with(&self, options: &Options) -> Self {
         let mut set = self.clone();
         for (name, value) in options.iter() {

@@ -34,7 +34,7 @@ use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// What a discriminator sees, and what its verdict is worth.
+/// Input of a discriminator, and the reward from its output.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Form {
     /// Two observations in a row; least squares.

@@ -34,7 +34,7 @@ impl Barrier {
     /// Returns when all threads have called it.
     ///
     /// # Panics
-    /// If a thread has given up ([`Barrier::guard`]): nobody else will come.
+    /// If a thread has given up ([`Barrier::guard`]): the others would wait forever.
     pub fn wait(&self) {
         let round = self.round.load(Ordering::Acquire);
         if self.arrived.fetch_add(1, Ordering::AcqRel) + 1 == self.n {

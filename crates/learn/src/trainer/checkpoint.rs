@@ -178,7 +178,7 @@ impl Checkpoint {
         Self { about, roles, agents: AgentStates::of(collectors, 0..shared.config.run.blocks()) }
     }
 
-    /// What comes before the names of each role's lists.
+    /// Prefix of the names of each role's lists.
     fn prefixes(about: &About) -> Vec<String> {
         let others = about.others.iter().enumerate().map(|(i, (name, _))| states::prefix(i + 1, name));
         [states::prefix(0, "")].into_iter().chain(others).collect()
@@ -310,7 +310,7 @@ impl Checkpoint {
         let about = About { state, ..self.about.clone() };
         write_description(&folder.join(DESCRIPTION), &about)?;
 
-        // states that no description names any more; failing to remove one harms nobody
+        // states that no description names any more; failing to remove one does no harm
         for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
             let old = entry.file_name().to_string_lossy().into_owned();
             if old.starts_with("state-") && old.ends_with(".safetensors") && old != name {

@@ -33,9 +33,9 @@ pub struct TrainConfig {
     pub statistics: StatisticsConfig,
     /// The rewards, the task's own first; the others' kinds differ.
     pub rewards: Vec<RewardConfig>,
-    /// What learns from the rollouts.
+    /// Algorithm that learns from the rollouts.
     pub algorithm: Algorithm,
-    /// What differs for roles of the task, by their names; the others have the settings above.
+    /// Settings that differ for roles of the task, by role name; other roles use the settings above.
     pub roles: BTreeMap<String, RoleConfig>,
 }
 
@@ -49,7 +49,7 @@ pub struct RoleConfig {
     pub statistics: StatisticsConfig,
     /// The rewards, the task's own first; the others' kinds differ.
     pub rewards: Vec<RewardConfig>,
-    /// What learns from the rollouts.
+    /// Algorithm that learns from the rollouts.
     pub algorithm: Algorithm,
 }
 

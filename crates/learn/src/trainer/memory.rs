@@ -1,4 +1,4 @@
-//! What a run needs of memory, looked at before it begins: an allocation that fails later ends the whole program.
+//! Memory that a run needs, checked before it begins: an allocation that fails later ends the whole program.
 
 use super::config::TrainConfig;
 use super::roles::RoleParts;
@@ -8,7 +8,7 @@ use crate::lanes::BLOCK;
 use marathon_physics::lanes::Isa;
 use std::hint::black_box;
 
-/// What environments, checkpoints being written and the rest take for every byte of the large arrays, at the most seen.
+/// Bytes of everything else, such as environments and checkpoints in writing, per byte of the large arrays: the most measured.
 const REST: f64 = 0.3;
 
 /// Refuses a run that does not fit into memory.
@@ -27,12 +27,12 @@ pub fn check(roles: &[RoleParts], isa: Isa, config: &TrainConfig) -> Result<(), 
 pub fn can_be_had(bytes: u64) -> bool {
     let mut probe: Vec<u8> = Vec::new();
     let fits = usize::try_from(bytes).is_ok_and(|bytes| probe.try_reserve_exact(bytes).is_ok());
-    // without this the compiler sees that nobody needs it, and takes it as given
+    // without this the compiler removes the unused allocation and assumes that it succeeds
     black_box(&probe);
     fits
 }
 
-/// What a run with less memory has smaller.
+/// Settings to reduce for a run that needs less memory.
 fn less(config: &TrainConfig) -> String {
     let replay = match &config.algorithm {
         Algorithm::Sac(sac) => format!(", a smaller replay (now {})", sac.replay),

@@ -52,7 +52,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use workers::{Crew, Worker};
 
-/// What a finished run returns.
+/// Result of a finished run.
 #[derive(Debug)]
 pub struct TrainOutput {
     /// The trained policy: of a task with several roles, the first one's.
@@ -146,7 +146,7 @@ struct Clocks {
     cpu: f64,
 }
 
-/// What all threads of a run share.
+/// State that all threads of a run share.
 struct Shared {
     config: TrainConfig,
     spec: Spec,
@@ -167,7 +167,7 @@ struct Shared {
     quit: AtomicBool,
 }
 
-/// What learning changes; every worker has the same.
+/// State that learning changes; every worker has an equal copy.
 struct Replica {
     /// Of each role.
     roles: Vec<RoleReplica>,
@@ -179,7 +179,7 @@ impl Replica {
         Self { roles: self.roles.iter().map(RoleReplica::copy).collect(), progress: self.progress }
     }
 
-    /// What a horizon is played with, by each role.
+    /// Rollout context of each role for a horizon.
     fn collecting(&self) -> Vec<RolloutContext<'_>> {
         self.roles.iter().map(|role| role.learner.collecting(&role.statistics)).collect()
     }

@@ -1,11 +1,11 @@
-//! What a caller sees of a run, and how it takes part.
+//! Lets a caller follow a run and stop it.
 
 use super::checkpoint::Checkpoint;
 use super::stats::IterationStats;
 use super::{TrainLoop, TrainOutput};
 use crate::policy::Policy;
 
-/// What an observer wants.
+/// An observer's decision about the run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Control {
     /// Go on.

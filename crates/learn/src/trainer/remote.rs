@@ -28,7 +28,7 @@ use std::path::Path;
 /// Both sides must have the same version.
 const VERSION: u32 = 3;
 
-/// What a message says of itself.
+/// Header of a message.
 #[derive(Serialize, Deserialize)]
 struct About {
     format: String,
@@ -148,7 +148,7 @@ impl Player {
 /// Prefixes of the lists of a task with one role.
 const ONE_ROLE: [String; 1] = [String::new()];
 
-/// What a slice's states of a task with one role are like.
+/// Shape of a slice's states, for a task with one role.
 fn shape(spec: &Spec, blocks: usize) -> StatesShape<'_> {
     StatesShape { blocks, obs: std::slice::from_ref(&spec.obs), act: spec.act }
 }
@@ -260,7 +260,7 @@ impl<'a> Remote<'a> {
     }
 }
 
-/// What a player has sent back.
+/// A player's reply.
 struct Answer {
     rollout: Rollout,
     agents: AgentStates,
@@ -282,7 +282,7 @@ impl Answer {
 /// Numbers of a block's sums, except for its observations, reward terms, rewards and metrics.
 const SUMS: usize = 15;
 
-/// What a learner needs of a rollout.
+/// Writes the parts of a rollout that a learner needs.
 fn write_rollout(rollout: &Rollout, file: &mut TensorWriter) {
     for (name, rows) in rollout.rows() {
         file.list(name, rows);

@@ -95,7 +95,7 @@ impl RoleParts {
         meta
     }
 
-    /// What reports say of its learning in an iteration.
+    /// Its learning statistics of an iteration, for reports.
     pub fn learned(&self, learner: &dyn Learner, totals: &Totals, updates: &LossSums) -> Learned {
         let sums = &totals.sums;
         let per_sample = |x: f64| if updates.samples > 0.0 { x / updates.samples } else { 0.0 };
@@ -119,11 +119,11 @@ impl RoleParts {
     }
 }
 
-/// What learning changes of a role; every worker has the same.
+/// State of a role that learning changes; every worker has an equal copy.
 pub struct RoleReplica {
-    /// What learns.
+    /// The role's learner.
     pub learner: Box<dyn Learner>,
-    /// What it has seen.
+    /// Statistics of its observations.
     pub statistics: Statistics,
     /// The first worker's: the mean of the numbers of its last policies, if the run averages them.
     pub average: Option<Vec<f64>>,

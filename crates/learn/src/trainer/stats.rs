@@ -1,4 +1,4 @@
-//! What reports say of an iteration.
+//! Statistics of an iteration for reports.
 
 use serde::{Deserialize, Serialize};
 
@@ -32,15 +32,15 @@ pub struct IterationStats {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub metrics: Vec<(String, f64)>,
 
-    /// What was learned: of a task with several roles, by the first.
+    /// Learning statistics; in a task with several roles, those of the first.
     #[serde(flatten)]
     pub learned: Learned,
-    /// What the other roles learned, by their names.
+    /// Learning statistics of the other roles, by name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub others: Vec<(String, Learned)>,
 }
 
-/// What a role earned and learned in an iteration.
+/// Returns and learning statistics of a role in an iteration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Learned {
     /// Mean return of the episodes that ended; none if none did.

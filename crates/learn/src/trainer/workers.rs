@@ -82,7 +82,7 @@ impl<'a> Worker<'a> {
         Self { crew, id, groups: 0 }
     }
 
-    /// The next of `parts` parts of a piece of work that nobody has taken yet.
+    /// The next of `parts` parts of a piece of work that no worker has taken yet.
     fn take(&self, parts: usize) -> Option<usize> {
         let part = self.crew.ticket.fetch_add(1, Ordering::Relaxed);
         (part < parts).then_some(part)

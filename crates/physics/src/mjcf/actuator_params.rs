@@ -1,4 +1,4 @@
-//! What an actuator makes of its control: gain, bias and activation, put together from classes and shortcuts.
+//! Gain, bias and activation of actuators, assembled from classes and shortcuts.
 
 use super::document::{Attr, Element};
 use super::error::MjcfError;

@@ -12,7 +12,7 @@ use super::tendon::require_fixed;
 use super::value::Attrs;
 use crate::model::{Equality, EqualityKind, JointType, Model, Quat, SolImp, SolRef, Vec3};
 
-/// What every kind of constraint has.
+/// Attributes that all kinds of constraints share.
 struct Common {
     active: bool,
     solref: SolRef,
@@ -62,7 +62,7 @@ pub(crate) fn compile(
     entries(root, "equality").map(compile).collect()
 }
 
-/// What a connect or weld joins.
+/// The two ends that a connect or weld joins.
 enum Ends {
     Bodies([usize; 2]),
     Sites([usize; 2]),

@@ -1,4 +1,4 @@
-//! What can be wrong with a model file, and where.
+//! Errors of model files, with file and line.
 
 use crate::hint::did_you_mean;
 use std::fmt;
@@ -83,7 +83,7 @@ pub enum MjcfErrorKind {
         element: String,
         /// The attribute.
         attribute: String,
-        /// What was looked for: `joint`, `site`, `default class`...
+        /// Kind of the missing name: `joint`, `site`, `default class`...
         kind: String,
         /// The name found.
         found: String,
@@ -93,7 +93,7 @@ pub enum MjcfErrorKind {
     /// An edit names something that the model does not have.
     #[error("there is no {kind} '{found}'{}", did_you_mean(.nearest.as_ref()))]
     NotFound {
-        /// What was looked for: `body`, `geom`, `section`...
+        /// Kind of the missing name: `body`, `geom`, `section`...
         kind: String,
         /// The name given.
         found: String,

@@ -52,7 +52,7 @@ pub(crate) struct GeomSpec<'a> {
     pub density: f64,
 }
 
-/// What a geom contributes to a contact.
+/// Contact parameters of a geom.
 pub(crate) struct Surface {
     pub contype: u32,
     pub conaffinity: u32,

@@ -1,4 +1,4 @@
-//! What follows from the reference configuration: mass matrix and inverse weights.
+//! Mass matrix and inverse weights in the reference configuration.
 //!
 //! In the reference configuration every joint is at rest, so the world poses are the bodies' own frames chained, and
 //! the mass matrix falls into one dense block per kinematic tree.

@@ -12,7 +12,7 @@
 //! `mass_matrix` (with `factor`) and `statistics` compute what follows from the reference configuration. `room` counts the memory
 //! that all of them ask for. [`spec`] edits the document before it is compiled.
 //!
-//! What changes the dynamics and is not supported is an error with file and line, never skipped.
+//! An unsupported element or attribute that changes the dynamics is an error with file and line; it is never skipped.
 
 mod actuator;
 mod actuator_params;

@@ -21,7 +21,7 @@ struct Rule {
     inside: Inside,
 }
 
-/// What an element may contain.
+/// Allowed children of an element.
 enum Inside {
     /// The elements of this list.
     Rules(&'static [Rule]),

@@ -8,7 +8,7 @@ use super::settings::entries;
 use super::value::Attrs;
 use crate::model::{GeomType, JointType, Model, Sensor, SensorObject, SensorType, TendonKind};
 
-/// What a sensor element is attached to, and with which attributes.
+/// Object that a sensor element is attached to, which decides the attributes.
 #[derive(Clone, Copy, PartialEq)]
 enum Target {
     Site,

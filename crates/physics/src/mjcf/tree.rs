@@ -125,7 +125,7 @@ struct Reader<'a, 's> {
 }
 
 impl<'a> Reader<'a, '_> {
-    /// What a body, the world or a frame contains. `frame` is that of enclosing frames within the body.
+    /// Reads the children of a body, the world or a frame. `frame` is that of enclosing frames within the body.
     fn children(
         &mut self,
         parent: &'a Element,

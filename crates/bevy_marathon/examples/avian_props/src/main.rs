@@ -17,7 +17,7 @@ const WALL: f32 = 3.0;
 /// Edge of a box, m, and its density, kg/m^3.
 const EDGE: f32 = 0.3;
 const DENSITY: f32 = 30.0;
-/// What moves faster than this has been put elsewhere, m/s.
+/// Speed above which a body counts as moved to a new place at once, m/s.
 const JUMP: f32 = 30.0;
 
 /// Lets avian's bodies and ragdolls touch each other.
@@ -32,7 +32,7 @@ impl Plugin for PropsPlugin {
     }
 }
 
-/// What avian knows of a geom: a kinematic body that follows a part.
+/// Avian's copy of a geom: a kinematic body that follows a part.
 #[derive(Component)]
 struct Shadow {
     ragdoll: Entity,
@@ -87,7 +87,7 @@ fn follow(
         let goal = (*track * *part * shadow.place).compute_transform();
         velocity.0 = (goal.translation - position.0) * rate;
         spin.0 = (goal.rotation * rotation.0.inverse()).to_scaled_axis() * rate;
-        // a new episode begins elsewhere; nobody is hit by that
+        // a new episode starts in another place; that jump must not hit anything
         if velocity.0.length() > JUMP {
             (position.0, rotation.0) = (goal.translation, goal.rotation);
             (velocity.0, spin.0) = (Vec3::ZERO, Vec3::ZERO);

@@ -57,7 +57,7 @@ pub fn names() -> Vec<&'static str> {
     SHIPPED.iter().map(|shipped| shipped.name).collect()
 }
 
-/// What stands for all clips that come with the crate, but for the one that does not move.
+/// Name for all clips that come with the crate, except [`STAND`].
 pub const ALL: &str = "all";
 
 /// The clip that does not move.

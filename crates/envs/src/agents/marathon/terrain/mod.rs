@@ -1,6 +1,6 @@
 //! Figures that run over uneven ground: the paper's assault courses.
 //!
-//! Each agent has ground of its own, drawn anew for every episode: a [course] of some kind and difficulty.
+//! Each agent has its own ground, drawn for every episode: a [course] of some kind and difficulty.
 //!
 //! | observation | content |
 //! |---|---|
