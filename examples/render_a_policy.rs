@@ -1,8 +1,8 @@
 //! From a policy file to a picture, by hand.
 //!
-//! Three pieces that know nothing of each other meet here: a [`Policy`] maps an observation to an action, a [`VecEnv`]
-//! maps an action to the next state, and a [`Renderer`] draws a state. What passes between the last two is `qpos`, the
-//! model's configuration, so anything that yields `qpos` can be drawn.
+//! This example connects three independent parts: a [`Policy`] maps an observation to an action, a [`VecEnv`] maps an action
+//! to the next state, and a [`Renderer`] draws a state. The renderer needs only `qpos`, the model's configuration, so it can
+//! draw anything that yields `qpos`.
 //!
 //! The command `marathon render` does the same with more options. There is no GPU in it: the renderer is a ray caster of
 //! spheres, capsules, boxes and a checkered floor.

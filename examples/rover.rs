@@ -1,11 +1,11 @@
-//! An agent that is told what to do: a rover that drives at a commanded velocity.
+//! An agent that takes commands: a rover that drives at a commanded velocity.
 //!
-//! [`Facts::command`] names what it can be told, [`Agent::command`] is its own schedule: a new velocity every one to three
-//! seconds, from random numbers that belong to the agent, its episode and its step alone. Observation and reward read it
+//! [`Facts::command`] declares the command. [`Agent::command`] is the agent's own schedule: a new velocity every one to three
+//! seconds, from random numbers that depend only on the agent, its episode and its step. Observation and reward read it
 //! with [`Senses::command`].
 //!
-//! Others tell it what to do in its schedule's place: a program (`steer_an_agent.rs`), a trainer in Python (`own_player.rs`),
-//! a gamepad (`crates/bevy_marathon/examples/steer.rs`).
+//! Other sources can replace the schedule: a program (`steer_an_agent.rs`), a trainer in Python (`own_player.rs`), or a
+//! gamepad (`crates/bevy_marathon/examples/steer.rs`).
 
 use marathon::envs::{Agent, CommandRange, EpisodeRng, Facts, Motors, Obs, Part, Senses, Terms, Tolerance, names};
 use marathon::physics::lanes::Real;

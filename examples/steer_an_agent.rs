@@ -1,8 +1,8 @@
-//! Agents that are told what to do: rovers, whose agent is [`rover.rs`](rover.rs).
+//! Agents that take commands: rovers, whose agent is [`rover.rs`](rover.rs).
 //!
-//! A caller's [`VecEnv::set_command`] goes before the agent's own schedule: a player's gamepad, another learner, a planner.
-//! Here the rovers are driven by two lines of control instead of a network; they find what they need in the observation by
-//! its names.
+//! [`VecEnv::set_command`] takes precedence over the agent's own schedule. The caller may be a gamepad, another learner or a
+//! planner. Here, two lines of control code drive the rovers instead of a network. They find their inputs in the observation
+//! by name.
 //!
 //! ```sh
 //! cargo run --release -p marathon-examples --bin steer_an_agent

@@ -150,7 +150,7 @@ def program(runs, ending, *words):
 
 
 def configurations():
-    """Those that ship."""
+    """Yield the configurations that ship."""
     for path in (HERE.parent / "assets/configs").glob("*.yaml"):
         yield path.read_bytes()
 

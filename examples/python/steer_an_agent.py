@@ -1,4 +1,4 @@
-"""An agent that is told what to do: a rover that learns to drive at a commanded velocity.
+"""An agent that takes commands: a rover that learns to drive at a commanded velocity.
 
 `commands` names what it can be told, `draw_command` is its own schedule: a new velocity every one to three seconds. It
 learns under that schedule; then a caller's `set_command` goes before it, as a player's gamepad or a planner would.

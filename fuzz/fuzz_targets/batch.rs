@@ -1,5 +1,5 @@
-//! Whatever is done with a batch, and with whatever numbers: nothing panics, nobody reads a state that is not finite
-//! after a step, snapshots are exact, and the lane width does not change a bit.
+//! For all calls of a batch and all numbers: nothing panics, states after a step are finite, snapshots are exact, and the lane
+//! width does not change a bit.
 
 #![no_main]
 

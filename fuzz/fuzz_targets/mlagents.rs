@@ -1,5 +1,5 @@
-//! What a trainer sends is a message or an error: neither the transport, nor the messages, nor the side channels panic on any
-//! bytes, and side channels that are read are finite. The same holds for demonstration files, whose numbers are those of the
+//! Any bytes from a trainer are a message or an error: neither the transport, nor the messages, nor the side channels panic on
+//! them, and side channels that are read are finite. The same holds for demonstration files, whose numbers are those of the
 //! task.
 
 #![no_main]

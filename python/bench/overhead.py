@@ -1,11 +1,11 @@
-"""What Python adds to a step of many agents.
+"""Python's share of a step of many agents.
 
     python python/bench/overhead.py [--agents 1024] [--json]
 
 Two parts, in microseconds of processor time of the calling thread, medians:
 
 * `gymnasium`: a step of `MarathonVectorEnv` whose native environment is a stand-in that returns the results of an
-  earlier step at once. What is left is all that Python does per step: infos, types, masks. In "next_step" no episode
+  earlier step at once. The rest is Python's work per step: infos, types, masks. In "next_step" no episode
   ends, as in most steps; in "same_step", one in a hundred does in every step, as when episodes last for a hundred.
 * `native`: a whole step of `VecEnv` with a single agent of the cheapest task: the call, its checks, its nine arrays,
   and the physics of one block of sixteen. So it is more than what the binding adds, which does not depend on the number
@@ -58,7 +58,7 @@ def microseconds(f: Callable[[], Any], repeats: int) -> float:
 
 
 def gymnasium_step(task: str, agents: int, mode: AutoresetMode, ends: int, repeats: int = 400) -> float:
-    """What `MarathonVectorEnv.step` costs besides the native step, in which `ends` episodes end."""
+    """Measure `MarathonVectorEnv.step` without the native step, in which `ends` episodes end."""
     envs = gymnasium.make_vec(f"marathon_envs/{task}", num_envs=agents, autoreset_mode=mode, threads=1)
     envs.reset(seed=1)
     actions = np.zeros(envs.action_space.shape, np.float32)
@@ -69,7 +69,7 @@ def gymnasium_step(task: str, agents: int, mode: AutoresetMode, ends: int, repea
 
 
 def native_step(repeats: int = 2000) -> float:
-    """What a step of `VecEnv` costs with next to no physics."""
+    """Measure a step of `VecEnv` with next to no physics."""
     env = marathon_envs.VecEnv("InvertedPendulum-v5", 1, threads=1)
     env.reset(1)
     actions = np.zeros((1, 1), np.float32)

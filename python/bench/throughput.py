@@ -2,7 +2,7 @@
 
     $ python python/bench/throughput.py --against envpool,gymnasium
 
-Every side makes random decisions, uniform within the actions' bounds, and resets whoever's episode ends. The sides
+Every side takes random actions, uniform within their bounds, and resets agents at the end of their episodes. The sides
 take turns, and a figure is the median of their rounds. Processor time is that of all threads of the process. `of 2
 threads` is the throughput of two threads, in time passed, by that of one.
 

@@ -41,7 +41,7 @@ def program() -> str:
 
 
 def _about(task: Task, dt: float) -> dict[str, Any]:
-    """What the game must know of a task: its name, or the model of a class."""
+    """Return the description of a task for the game: its name, or the model of a class."""
     if isinstance(task, str):
         return {"agent": task}
     source = os.fspath(task.mjcf)

@@ -234,7 +234,7 @@ class AgentVecEnv:
         self.agent.command[mask] = self._tell(mask, np.zeros(self.num_envs, np.int64))[mask]
 
     def _tell(self, mask: BoolArray, steps: npt.NDArray[np.int64]) -> FloatArray:
-        """Find out what the agents in a mask are told in their observations of these numbers, 0 at a start."""
+        """Return the commands in the observations of the agents in a mask, at these steps (0 at a start)."""
         ranges = self.agent.commands
         if not ranges:
             return self.agent.command
@@ -281,7 +281,7 @@ class AgentVecEnv:
 
     @property
     def command(self) -> FloatArray:
-        """What each agent was told by the observation that it has, `(N, len(spec.command))`."""
+        """Return the command in each agent's current observation, `(N, len(spec.command))`."""
         return self.agent.command.copy()
 
     def _begin(self, mask: BoolArray) -> None:
@@ -420,7 +420,7 @@ class AgentVecEnv:
         return self.obs, reward, terminated, truncated
 
     def read_info(self) -> npt.NDArray[np.float32]:
-        """What the agents report about their present states, `(N, len(spec.info))`."""
+        """Return the agents' metrics of their current states, `(N, len(spec.info))`."""
         return self._numbers("info", self.agent.info(), self._reported).astype(np.float32)
 
     @property
@@ -451,7 +451,7 @@ class AgentVecEnv:
         return _snapshots.pack(self.agent.sim.save(), self._arrays())
 
     def _arrays(self) -> dict[str, npt.NDArray[Any]]:
-        """What a snapshot holds besides the physics; commands where there are any."""
+        """Return the contents of a snapshot besides the physics, with commands if there are any."""
         named = {name: getattr(self, name) for name in (*_SAVED, *_COMMANDS)}
         named["command"] = self.agent.command
         return named if self.agent.commands else {name: named[name] for name in _SAVED}
@@ -466,7 +466,7 @@ class AgentVecEnv:
         self._ready = True
 
     def __getstate__(self) -> dict[str, Any]:
-        """What a copy is made of: arguments, a snapshot, observations. Of the agent, only its memory is copied."""
+        """Return the state for a copy: arguments, a snapshot, observations. A copy has only the memory of the agent."""
         return {"made": self._made, "snapshot": self.save() if self._ready else None, "obs": self.obs}
 
     def __setstate__(self, state: dict[str, Any]) -> None:

@@ -168,7 +168,7 @@ class MarathonAgent:
         return qpos, qvel
 
     def draw_command(self, random: Streams, step: npt.NDArray[np.int64]) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-        """Return what `len(random)` agents are told, `(n, len(commands))`, and for how many decisions, `(n,)`.
+        """Return commands for `len(random)` agents, `(n, len(commands))`, and their number of decisions, `(n,)`.
 
         It is the agents' own schedule, asked at the start of an episode and whenever a command has run out; `step`,
         `(n,)`, is the number of each agent's observation in its episode. Random numbers come from `random`, row by row
@@ -206,7 +206,7 @@ class MarathonAgent:
         return self.terminate_never()
 
     def truncate(self) -> BoolArray:
-        """Return whose episode is over before the time limit without failure, `(N,)`. This one: nobody's."""
+        """Return which agents end their episode before the time limit without failure, `(N,)`: by default, none."""
         return self.terminate_never()
 
     def info(self) -> Mapping[str, FloatArray]:

@@ -85,7 +85,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._flat = _spaces.is_gymnasiums(self.task_spec)
         self._task, self._size, self._options = task, (width, height), options
         self._renderer: Renderer | None = None
-        # opened before the first episode, so that what is missing is told at once
+        # opened before the first episode, so that a missing dependency is reported at once
         self._window = _window.Window(task, self.dt) if render_mode == "human" else None
         # for the camera: time, and that of the last picture
         self._seconds = self._drawn = 0.0
@@ -155,7 +155,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         return obs
 
     def __getstate__(self) -> dict[str, Any]:
-        """What a copy is made of. A renderer is made anew, a window cannot be copied."""
+        """Return the state for a copy. A copy creates its own renderer; a window cannot be copied."""
         if self._window is not None:
             raise TypeError("an environment with a window cannot be copied or pickled, expected another render_mode")
         return {**self.__dict__, "_renderer": None}

@@ -33,7 +33,7 @@ _Z = 1.96
 
 @dataclass(frozen=True)
 class Score:
-    """What a policy has earned in some episodes."""
+    """Results of a policy in some episodes."""
 
     returns: tuple[float, ...]
     """Undiscounted sum of the rewards of each episode."""

@@ -145,7 +145,7 @@ class Workers:
 
 
 class _Actor:
-    """What runs in a worker's process."""
+    """Code that runs in a worker's process."""
 
     def __init__(self, task: str, config: str, slice: int, slices: int) -> None:
         self._player = Player(task, config, slice, slices)
@@ -228,7 +228,7 @@ def register() -> None:
 
 
 def _creator(task: str) -> Callable[[Mapping[str, Any]], Any]:
-    """What makes environments of a task for RLlib: many agents if `num_envs` is among the arguments."""
+    """Return a creator of environments of a task for RLlib, with many agents if `num_envs` is among the arguments."""
 
     def create(arguments: Mapping[str, Any]) -> gymnasium.Env[Any, Any] | MarathonVectorEnv:
         options = dict(arguments)

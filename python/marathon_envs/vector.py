@@ -181,7 +181,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
             self._add_step(infos, terms, distance, diverged, acted)
             return self._observed(obs), rewards, terminated, truncated, infos
 
-        # what is told of the agents whose episode ended belongs to the end, the rest to the next beginning
+        # infos of agents whose episode ended describe its end; the others describe the next start
         last_x = None if before is None else _only(rows, before + distance)
         final = self._report(_only(rows, info) if self._info else info, last_x, ended)
         self._add_step(final, _only(rows, terms), _only(rows, distance), diverged, ended)
@@ -203,7 +203,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         self._seconds[agents] += 2.0
 
     def _report(self, info: FloatArray, x: FloatArray | None, mask: BoolArray) -> Infos:
-        """What the agents in `mask` report of a state."""
+        """Return the metrics of a state for the agents in `mask`."""
         infos: Infos = {}
         # all columns at once, as Gymnasium's type of numbers
         for (name, which), numbers in zip(self._info, info.astype(np.float64).T, strict=True):
@@ -248,7 +248,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         return self._observed(saved["obs"])
 
     def __getstate__(self) -> dict[str, Any]:
-        """What a copy is made of; renderers are made anew."""
+        """Return the state for a copy; a copy creates its own renderers."""
         return {**self.__dict__, "_renderers": None}
 
     def get_state(self) -> tuple[FloatArray, FloatArray]:

@@ -62,7 +62,7 @@ def test_a_run_goes_on_with_the_same_bits(tmp_path: Path) -> None:
     part = train(Arm, CONFIG, out=tmp_path / "part", **settings, callback=lambda row: row["iteration"] < 2)
     assert part.interrupted and part.steps == 4096
     assert not np.array_equal(part.policy(obs), whole(obs))
-    # without the class, nobody knows the task
+    # without the class, the task is unknown
     with pytest.raises(ValueError, match="agent 'Arm-v0' does not exist"):
         train(resume=tmp_path / "part")
     with pytest.raises(ValueError, match=r"agent: found Arm-v0, expected Leg-v0"):

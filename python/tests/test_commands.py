@@ -1,4 +1,4 @@
-"""Agents that are told what to do, and names of what they observe, for classes in Python and for native tasks."""
+"""Agents that take commands, and names of their observations, for classes in Python and for native tasks."""
 
 import copy
 import pickle
@@ -82,7 +82,7 @@ def test_a_schedule_is_drawn_observed_and_rewarded() -> None:
         told = commanded(obs).copy()
         assert np.array_equal(told, carts.command.astype(np.float32))
         obs, reward, _, truncated = carts.step(actions(decision))
-        # rewarded for the command under which it decided, not for the one that it is told next
+        # rewarded for the command under which it acted, not for the next one
         expected = -np.abs(carts.final_obs[:, 0] - told[:, 0])
         assert reward == pytest.approx(expected, abs=1e-5)
         assert carts.info[:, 0] == pytest.approx(-expected, abs=1e-5)

@@ -1,4 +1,4 @@
-"""What the tests share: the player, ports that no other test has, environments that are closed whatever happens."""
+"""Fixtures of the tests: the player, ports that no other test uses, environments that are always closed."""
 
 import os
 import pathlib
@@ -47,5 +47,5 @@ def launch(tmp_path):
 
 @pytest.fixture
 def log(tmp_path):
-    """What the player of a worker has logged."""
+    """Log of a worker's player."""
     return lambda worker=0: (tmp_path / f"Player-{worker}.log").read_text()

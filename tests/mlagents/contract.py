@@ -1,4 +1,4 @@
-"""What Unity's importer checks of a policy file, from the list in its package's model loader. (Not Unity itself.)"""
+"""The checks of Unity's importer for a policy file, from the list in its package's model loader. (Not Unity itself.)"""
 
 import numpy as np
 import onnx

@@ -27,7 +27,7 @@ def rovers(launch, *args):
 
 
 def told(env):
-    """What each rover observes as its command."""
+    """Return the command that each rover observes."""
     return env.get_steps(NAME)[0].obs[0][:, 0].copy()
 
 

@@ -30,7 +30,7 @@ DT = 0.02
 
 @pytest.fixture
 def screen():
-    """A display that nobody else has."""
+    """A display that no other program uses."""
     words = ["Xvfb", "-displayfd", "1", "-screen", "0", "1280x720x24", "-nolisten", "tcp"]
     xvfb = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     yield f":{xvfb.stdout.readline().strip()}"

@@ -173,9 +173,9 @@ def test_two_roles_learn_in_one_run(tmp_path, task, behaviors, changes, again, t
     longest = {b: max(curve(tmp_path, "Environment/Episode Length", behavior=b)) for b in behaviors}
     # ML-Agents does not count an episode's last decision
     assert longest[first] > 30 and again - 1 < longest[second] <= again, longest
-    # terms of a role's reward are told under its name
+    # terms of a role's reward are reported under its name
     assert curve(tmp_path, f"{second}/Reward/{term}", behavior=second)
-    # the first role's policy plays where nobody opposes it
+    # the first role's policy plays without an opponent
     words = ["eval", tmp_path / "run" / f"{first}.onnx", "--agent", first, "--option", alone, "--episodes", "4"]
     assert json.loads(subprocess.check_output([MARATHON, "--json", *words], text=True))["episodes"] == 4
 

@@ -44,7 +44,7 @@ GRAY = [0.5, 0.5, 0.5, 1.0]
 
 
 def actuated(m, kind, i):
-    """What actuators add to a joint or tendon: armature, damping and its two higher coefficients.
+    """Return the actuators' contribution to a joint or tendon: armature, damping and its two higher coefficients.
 
     MuJoCo keeps them with the actuators and adds them, times the square of the gear, whenever it uses them.
     """

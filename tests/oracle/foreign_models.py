@@ -87,7 +87,7 @@ def names(enum, values):
 
 
 def features(model):
-    """What a model uses that not every model does."""
+    """Return the features of a model that not every model uses."""
     out = [f"integrator {names(mujoco.mjtIntegrator, [model.opt.integrator])[0]}"]
     out += [f"cone {names(mujoco.mjtCone, [model.opt.cone])[0]}"]
     out += [f"joint {n}" for n in names(mujoco.mjtJoint, model.jnt_type)]
@@ -102,7 +102,7 @@ def features(model):
 
 
 def listing():
-    """What the files are."""
+    """Return a description of the files."""
     seen, out = {}, []
     for name, path in files():
         digest = hashlib.sha256(path.read_bytes()).hexdigest()

@@ -1,4 +1,4 @@
-"""What MuJoCo's solver makes of models whose cap ends it early, under the models' own settings.
+"""Results of MuJoCo's solver for models whose cap ends it early, under the models' own settings.
 
 Reads a JSON list of jobs from standard input:
     {"xml": text, "seed": s, "trajectories": n, "steps": k, "home": h}

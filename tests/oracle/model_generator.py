@@ -24,7 +24,7 @@ def element(name, attributes, children=()):
 
 
 class Generator:
-    """Draws a model. What it draws is listed in `docs/physics.md` as supported."""
+    """Draws a model. It uses only features that `docs/physics.md` lists as supported."""
 
     def __init__(self, seed):
         self.rng = np.random.default_rng([2026, seed])
@@ -216,7 +216,7 @@ class Generator:
         if self.maybe(0.5):
             out.update(diaginertia=[a, b, self.u(abs(a - b) + 1e-4, a + b)], **self.orientation(0.5))
         else:
-            # a positive definite matrix whose moments obey the triangle inequality
+            # a positive definite matrix whose moments satisfy the triangle inequality
             m = self.vector(1.0, 9).reshape(3, 3)
             s = m @ m.T * a
             full = np.trace(s) * np.eye(3) - 0.99 * s

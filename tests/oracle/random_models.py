@@ -115,7 +115,7 @@ def weightless(model, data):
 
 
 def answer(model, data, state, rng):
-    """What MuJoCo makes of a state, or why it has no definite answer."""
+    """Return MuJoCo's results for a state, or the reason why it has no definite answer."""
     forward(model, data, state)
     acc, contacts = data.qacc.copy(), data.ncon
     if warned(data) or not np.isfinite(acc).all() or np.abs(acc).max(initial=0.0) > LARGEST_ACCELERATION:

@@ -1,4 +1,4 @@
-"""What PyTorch makes of a discriminator's loss, whose penalty takes second derivatives.
+"""PyTorch's gradients of a discriminator's loss, whose penalty takes second derivatives.
 
 Reads a JSON list of cases from standard input:
     {"form": "amp" or "gail", "activation": name, "sizes": [...], "params": [...], "own": [[...]], "expert": [[...]],

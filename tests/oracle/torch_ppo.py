@@ -1,4 +1,4 @@
-"""What PyTorch makes of PPO's objective.
+"""PyTorch's gradients of PPO's objective.
 
 Reads a JSON list of cases from standard input, one per activation and kind of value loss:
     {"activation": name, "sizes": {"actor": [...], "critic": [...]}, "params": {"actor": [...], "critic": [...]},

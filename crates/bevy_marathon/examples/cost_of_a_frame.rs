@@ -1,4 +1,4 @@
-//! What the simulation costs: processor time per frame at 60 frames per second, for any agent and number.
+//! Cost of the simulation: processor time per frame at 60 frames per second, for any agent and number.
 //!
 //! `cargo run --release -p bevy_marathon --no-default-features --example cost_of_a_frame -- humanoid 64`
 

@@ -48,7 +48,7 @@ impl Ground {
     /// All shapes except [`Ground::Track`], which [`LaidGround`](crate::LaidGround) shapes.
     pub const ALL: [Ground; 4] = [Ground::Level, Ground::Hills, Ground::Stairs, Ground::Boards];
 
-    /// What it is called on the screen, on the command line and in recordings.
+    /// Its name on the screen, on the command line and in recordings.
     pub fn name(self) -> &'static str {
         match self {
             Ground::Level => "level",

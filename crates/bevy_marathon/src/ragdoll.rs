@@ -19,7 +19,7 @@ use std::sync::Arc;
 #[reflect(Component, Clone, Debug)]
 #[require(Transform, Episode, Restart, OwnGround)]
 pub struct Ragdoll {
-    /// What it is.
+    /// Kind of the ragdoll.
     pub character: Character,
     /// Seed of its random starts.
     pub seed: u64,
@@ -116,7 +116,7 @@ pub struct Target {
     pub radius: f32,
 }
 
-/// What this ragdoll has of its own: masses, friction, strength of the actuators, gravity. Take
+/// Physical constants of this ragdoll: masses, friction, strength of the actuators, gravity. Start from
 /// [`Variation::none`] of [`Anatomy::model`] and change it.
 #[derive(Component, Clone, Debug, PartialEq, Reflect)]
 #[reflect(Component, Clone, Debug, PartialEq)]
@@ -132,7 +132,7 @@ pub(crate) struct VariationFields {
     pub gravity: [f64; 3],
 }
 
-/// What happens when an episode has ended.
+/// Behavior after the end of an episode.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Default, Clone, Debug, PartialEq)]
 pub struct Restart {
@@ -172,7 +172,7 @@ pub struct Episode {
     pub reward: f32,
     /// Its terms, in the order of [`Spec::reward_terms`].
     pub terms: Vec<f32>,
-    /// What the agent reports of the state reached, in the order of [`Spec::info`].
+    /// The agent's metrics of the state reached, in the order of [`Spec::info`].
     pub info: Vec<f32>,
     /// Distance run along the track, m.
     pub distance: f64,
@@ -217,8 +217,8 @@ impl Anatomy {
     }
 }
 
-/// A body of a [`Ragdoll`]: a child whose [`Transform`] the plugin writes every frame. What is attached to it is carried
-/// along. Where it is in a tick between frames, [`crate::Marathon::places`] knows.
+/// A body of a [`Ragdoll`]: a child whose [`Transform`] the plugin writes every frame. Its children move along with it.
+/// [`crate::Marathon::places`] returns its position in a tick between frames.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Component, Clone, Debug, PartialEq)]
 pub struct Part {

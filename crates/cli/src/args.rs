@@ -32,12 +32,12 @@ pub struct Args {
     /// Print one JSON object on stdout and nothing else there.
     #[arg(long, global = true)]
     pub json: bool,
-    /// What to do.
+    /// Command to run.
     #[command(subcommand)]
     pub command: Command,
 }
 
-/// What to do.
+/// Command to run.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Learn a policy and evaluate it.

@@ -30,7 +30,7 @@ pub enum CliError {
     Lost {
         /// The first failure.
         cause: RunError,
-        /// What is saved, and how to continue.
+        /// Names the saved files, and how to continue.
         advice: String,
     },
     /// A Python process does not start or answer.

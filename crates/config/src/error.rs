@@ -43,7 +43,7 @@ pub enum ConfigError {
         line: usize,
         /// Column, counted from 1.
         column: usize,
-        /// What is wrong, and what was expected.
+        /// The problem, and the expected contents.
         problem: String,
     },
     /// A key that neither ML-Agents nor Marathon knows.

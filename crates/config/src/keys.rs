@@ -36,7 +36,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// What is expected, for messages and the reference.
+    /// The expected value in words, for messages and the reference.
     pub fn text(self) -> String {
         match self {
             Count(0, MOST | MOST_STEPS | u64::MAX) => "a whole number".into(),
@@ -63,7 +63,7 @@ pub struct Key {
     /// Its name, with dots inside a section of the section.
     pub name: &'static str,
     pub kind: Kind,
-    /// What it means, with its unit.
+    /// Its meaning, with its unit.
     pub about: &'static str,
 }
 

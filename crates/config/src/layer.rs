@@ -63,7 +63,7 @@ impl File {
         self.tasks.iter().any(|(known, _)| known.eq_ignore_ascii_case(name))
     }
 
-    /// What the file says about a task, and a note if that is only what it says about all of them.
+    /// The file's settings for a task, and a note if the file has only settings for all tasks.
     pub fn of_task(&self, task: &str) -> (Layer, Option<String>) {
         let found = names::find(task, self.tasks.iter().map(|(name, _)| name.as_str()));
         match self.tasks.iter().find(|(name, _)| Some(name.as_str()) == found) {

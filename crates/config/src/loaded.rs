@@ -23,7 +23,7 @@ pub struct Loaded {
     pub checkpoint_interval: u64,
     /// Policies on the way that are kept.
     pub keep_checkpoints: usize,
-    /// What the user should know: settings that have no effect here, or not the one that they seem to have.
+    /// Notes for the user: settings that have no effect here, or a different one than their name suggests.
     pub notes: Vec<String>,
 }
 
@@ -171,7 +171,7 @@ fn choose(role: &mut Object<String, Json>, over: &Object<String, Json>) {
     }
 }
 
-/// What is in one document and not in the other, section by section.
+/// Values that are in one document and not in the other, section by section.
 fn differences(document: &Object<String, Json>, other: &Object<String, Json>) -> Object<String, Json> {
     let mut found = Object::new();
     for (key, value) in document {

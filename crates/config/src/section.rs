@@ -149,7 +149,7 @@ impl Range {
                 Range::Finite => true,
             }
     }
-    /// What is expected.
+    /// The range in words, for messages.
     pub fn text(self) -> &'static str {
         match self {
             Range::Positive => "a positive number",

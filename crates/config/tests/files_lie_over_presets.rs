@@ -1,5 +1,5 @@
-//! A file of Marathon's names what differs from the preset of the task, by the fields of the trainer's configuration. What is
-//! wrong in it is refused with its line.
+//! A file of Marathon's contains the settings that differ from the preset of the task, by the fields of the trainer's
+//! configuration. Errors name the line.
 
 use marathon_config::{Loaded, default_for, default_of, parse, parse_object, set};
 use marathon_learn::{Algorithm, Ppo, RewardKind, Schedule};

@@ -1,6 +1,6 @@
-//! How long a device's word takes to become a command, beside how long the character takes to obey: with nothing but a dead zone
-//! and a curve, a frame and a decision; smoothing adds 2.3 times its time to what is 90 % of the word. The table in `docs/game.md`
-//! is what this test prints.
+//! Time from a device's event to the command, compared with the character's response time. With only a dead zone and a curve, it
+//! is a frame and a decision. Smoothing adds 2.3 times its time until 90 % of the command. This test prints the table in
+//! `docs/game.md`.
 
 #[path = "../../bevy_marathon/tests/common/devices.rs"]
 mod devices;

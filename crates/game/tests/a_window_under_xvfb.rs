@@ -43,7 +43,7 @@ fn screen() -> Result<(Running, String), Box<dyn Error>> {
     Ok((xvfb, display))
 }
 
-/// What the game says, line by line.
+/// Output of the game, line by line.
 struct Words(Receiver<String>, String);
 
 impl Words {

@@ -163,7 +163,7 @@ fn settings_that_mean_nothing_to_an_algorithm_are_refused() {
     }
 }
 
-/// What is left out has its default, a number is a schedule that stays, and the section of an algorithm chooses it.
+/// Missing fields have their defaults, a number is a constant schedule, and the section of an algorithm chooses it.
 #[test]
 fn a_configuration_is_written_by_names_of_its_fields() {
     let read = |json: &str| serde_json::from_str::<TrainConfig>(json).unwrap();

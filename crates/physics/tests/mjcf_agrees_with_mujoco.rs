@@ -61,7 +61,7 @@ fn marathons_own_agents() {
     }
 }
 
-/// What the edit API writes is a model to MuJoCo, too.
+/// MuJoCo also reads the models that the edit API writes.
 #[test]
 fn edited_models() {
     let mut spec = ModelSpec::from_xml_file(workspace().join("assets/agents/humanoid.xml")).expect("a model");

@@ -49,7 +49,7 @@ impl Player {
 pub struct PyPlayers {
     object: Py<PyAny>,
     slices: usize,
-    /// What it raised.
+    /// The exception that it raised.
     pub failure: Option<PyErr>,
 }
 

@@ -22,7 +22,7 @@ const AGENTS_PER_THREAD: usize = 64;
 /// Size of an agent's allocations, bytes.
 const OVERHEAD: usize = 500;
 
-/// What is read together, because it all comes from the frames of the bodies.
+/// Quantities that are read together, because all come from the frames of the bodies.
 const FRAMES: [Quantity; 6] = [
     Quantity::BodyPos,
     Quantity::BodyAxes,

@@ -99,7 +99,7 @@ impl VecEnv {
         self.env().threads()
     }
 
-    /// What happens to an agent whose episode ended: "next_step", "same_step" or "disabled".
+    /// Reset mode for agents whose episode ended: "next_step", "same_step" or "disabled".
     #[getter]
     fn autoreset(&self) -> &'static str {
         AUTORESET.iter().find(|(_, mode)| *mode == self.autoreset).map_or("", |(name, _)| name)
@@ -136,13 +136,13 @@ impl VecEnv {
         self.arrays.terms.clone_ref(py)
     }
 
-    /// What the agents report about the states that the last step reached, `(num_envs, len(spec.info))`.
+    /// The agents' metrics of the states that the last step reached, `(num_envs, len(spec.info))`.
     #[getter]
     fn info(&self, py: Python<'_>) -> Py<PyArray2<f32>> {
         self.arrays.info.clone_ref(py)
     }
 
-    /// What the agents report about their present states, `(num_envs, len(spec.info))`, a new array. It differs from `info`
+    /// The agents' metrics of their current states, `(num_envs, len(spec.info))`, a new array. It differs from `info`
     /// where a step has begun an episode.
     fn read_info<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let (n, columns) = (self.num_envs, self.spec.get().info.len());
@@ -285,9 +285,9 @@ impl VecEnv {
         Ok(self.model.as_ref().expect("it was made").clone_ref(py))
     }
 
-    /// Gives agents, all or those of a mask, constants of their own: factors of the bodies' masses and inertias,
-    /// `(num_envs, nbody)`, of all friction coefficients, `(num_envs,)`, and of the actuators' forces, `(num_envs, nu)`;
-    /// gravity, m/s^2, `(num_envs, 3)`. What is not given is the model's own. They last over resets, until changed.
+    /// Sets constants of all agents or those of a mask: factors of the bodies' masses and inertias, `(num_envs, nbody)`, of
+    /// all friction coefficients, `(num_envs,)`, and of the actuators' forces, `(num_envs, nu)`; gravity, m/s^2,
+    /// `(num_envs, 3)`. Omitted constants have the model's values. They last over resets, until changed.
     #[pyo3(signature = (*, mass = None, friction = None, strength = None, gravity = None, mask = None))]
     fn vary(
         &mut self,

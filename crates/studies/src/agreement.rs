@@ -53,7 +53,7 @@ pub fn run(options: &Options) -> Result<Record, StudyError> {
                 `marathon-player` and by `marathon train`, for as many steps with the same schedules. Policies are judged \
                 alike: the best actions of ML-Agents' `.onnx` and of our policy file over a hundred episodes here. `while \
                 training` is the mean return of the episodes that ended in the last tenth of the steps, with exploration. \
-                What a file of ML-Agents does not say is done as there: each action's probability ratio is bounded by \
+                Marathon also adopts the behavior of ML-Agents that no key controls: each action's probability ratio is bounded by \
                 itself, networks start from its weights, samples are clipped to 3 and divided by it, Adam has PyTorch's \
                 epsilon, and the value's change is not bounded, since ML-Agents 1.1.0 reads the returns where it stored \
                 the old values."

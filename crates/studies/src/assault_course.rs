@@ -162,8 +162,8 @@ fn about() -> String {
          runner, a third learner, earns more on the same ground, with as many decisions for each of the two. Each learns with and without \
          seeing the ground ahead.\n\n\
          The policy's best actions are judged over {EPISODES} episodes on level ground, on the two courses made by hand at full size, on mixed \
-         courses of full difficulty, and on the original's meters, of up to 0.5 m. The courses made by hand and the meters are \
-         nobody's training ground. *Its own adversary* has learned against the finished runner for {} decisions, with steps of at most half \
+         courses of full difficulty, and on the original's meters, of up to 0.5 m. No runner was trained on the courses \
+         made by hand or on the meters. *Its own adversary* has learned against the finished runner for {} decisions, with steps of at most half \
          a meter, while the runner stayed as it was; some runs have not met one. A cell is the mean way of an episode in m, and how many of {EPISODES} episodes ended with a \
          fall: medians over the seeds, and each seed's number in brackets if they differ. The picture has the mean of both \
          courses made by hand.",

@@ -14,7 +14,7 @@ pub struct Record {
     pub name: &'static str,
     /// Heading.
     pub title: &'static str,
-    /// What the study measures and how, in one or more paragraphs.
+    /// Measurements and method of the study, in one or more paragraphs.
     pub about: String,
     /// Headings of the columns.
     pub columns: Vec<&'static str>,

@@ -112,7 +112,7 @@ class MarathonParallelEnv(ParallelEnv[str, FloatArray, FloatArray]):
         return results
 
     def state(self) -> FloatArray:
-        """What all agents see, `(num_agents, obs_size)`."""
+        """Return the observations of all agents, `(num_agents, obs_size)`."""
         return self._env.obs.astype(self._dtype)
 
     def render(self) -> FloatArray | None:

@@ -14,7 +14,7 @@ from marathon_envs._tasks import Task
 class SkrlEnv(Wrapper):
     """Many agents for skrl's trainers, in the form that `skrl`'s `wrap_env` gives to other environments.
 
-    An episode that ended begins anew within the same step; `info["final_obs"]` has the observations that the step
+    Agents whose episode ended are reset within the same step; `info["final_obs"]` has the observations that the step
     reached, `(num_envs, obs_size)`.
     """
 
@@ -47,7 +47,7 @@ class SkrlEnv(Wrapper):
         return torch.from_numpy(array).to(self._device)
 
     def reset(self) -> tuple[torch.Tensor, dict[str, Any]]:
-        """Start the episodes at the first call; later ones return where the agents are, since they begin anew alone."""
+        """Start the episodes at the first call. Later calls return the current observations, since agents reset themselves."""
         if self._obs is None:
             entropy = np.random.SeedSequence().generate_state(1, np.uint64)[0]
             seed = _spaces.native_seed(entropy if self._seed is None else self._seed)

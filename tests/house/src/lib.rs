@@ -17,7 +17,7 @@ pub use plan::{Crate, House, Room};
 
 use std::path::PathBuf;
 
-/// What keeps the house from being read.
+/// Errors of reading the house.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A file cannot be read or written.
@@ -35,7 +35,7 @@ pub enum Error {
         path: PathBuf,
         /// Where in it.
         line: usize,
-        /// What the parser says.
+        /// Message of the parser.
         message: String,
     },
     /// Cargo does not tell the crates of the workspace.

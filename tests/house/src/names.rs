@@ -32,7 +32,7 @@ struct Use {
     public: bool,
 }
 
-/// What a path can name.
+/// Kind of item that a path names.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// A module.

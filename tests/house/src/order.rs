@@ -3,7 +3,7 @@
 use crate::Error;
 use std::path::Path;
 
-/// What the page says.
+/// Order that the page describes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Order {
     /// Crates, the one below all others first.
@@ -12,7 +12,7 @@ pub struct Order {
     pub rooms: Vec<(String, Vec<Step>)>,
 }
 
-/// What the lines of the page are about.
+/// Subject of the page's lines.
 enum Section {
     Crates,
     Rooms,
@@ -24,7 +24,7 @@ enum Section {
 pub struct Step {
     /// The crate or room.
     pub name: String,
-    /// What it is.
+    /// Its description.
     pub about: String,
 }
 

@@ -17,7 +17,7 @@ pub struct Source {
     pub module: Vec<String>,
     /// Number of lines.
     pub lines: usize,
-    /// What the parser found.
+    /// Syntax tree from the parser.
     pub syntax: syn::File,
 }
 

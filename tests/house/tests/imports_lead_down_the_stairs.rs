@@ -26,7 +26,7 @@ fn differences<'a>(said: &'a [Step], found: impl Iterator<Item = &'a String>) ->
     said.symmetric_difference(&found).copied().collect()
 }
 
-/// What is wrong with a crate whose rooms are said to stand in an order.
+/// Faults of a crate whose rooms have a declared order.
 fn faults(found: &Crate, steps: &[Step]) -> Vec<String> {
     let level = |room: &str| steps.iter().position(|step| step.name == room);
     let wrong = |import: &&house::Import| level(&import.to) >= level(&import.from);

@@ -63,7 +63,7 @@ pub(crate) struct Shape {
     pub ragdoll: Entity,
     /// Index in the model's geoms.
     pub geom: usize,
-    /// What it is made of when nothing else is to be seen on it.
+    /// Material without color-coded marks, such as errors.
     pub own: Handle<StandardMaterial>,
 }
 

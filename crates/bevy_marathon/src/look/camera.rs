@@ -56,7 +56,7 @@ impl CameraMode {
         }
     }
 
-    /// What it is called on the screen.
+    /// Its name on the screen.
     pub fn name(self) -> &'static str {
         match self {
             CameraMode::Side => "side",
@@ -92,7 +92,7 @@ pub struct FollowCamera {
     pub pitch: f32,
     /// Distance, m.
     pub distance: f32,
-    /// What it looks at, m.
+    /// The point that it looks at, m.
     pub focus: Vec3,
     /// How far ahead of whom it follows that is, m.
     pub ahead: f32,

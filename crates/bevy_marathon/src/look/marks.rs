@@ -47,7 +47,7 @@ impl Plugin for MarksPlugin {
     }
 }
 
-/// What to draw about a ragdoll.
+/// Marks to draw for a ragdoll.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Component, Default, Clone, Debug, PartialEq)]
 pub struct Marks {

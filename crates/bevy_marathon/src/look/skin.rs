@@ -1,8 +1,8 @@
 //! Skins: a glTF character with a skeleton that a ragdoll wears in place of its shapes.
 //!
-//! Which bone follows which body is told by a mapping, as for the import of motions: those that come with Marathon know the
-//! names that many makers give to bones. A bone turns as its body does, and keeps its length; the skin as a whole is scaled so
-//! that its legs are as long as the ragdoll's.
+//! A mapping assigns bones to bodies, as for the import of motions. The mappings that come with Marathon include the bone names
+//! of many tools. A bone turns as its body does, and keeps its length. The whole skin is scaled so that its legs are as long
+//! as the ragdoll's.
 
 use crate::axes::{to_game, to_physics};
 use crate::look::body::BodyMesh;
@@ -94,7 +94,7 @@ struct Fitted {
     poser: SkeletonPoser,
     /// Bones, those of the skeleton in its order.
     bones: Vec<Entity>,
-    /// What is above the first bone, in the axes of the ragdoll: a place, a turn, and a scale.
+    /// Transform above the first bone, in the axes of the ragdoll: position, rotation and scale.
     above: Transform,
 }
 

@@ -28,12 +28,12 @@ use clap::Subcommand;
                   when all of them are busy."
 )]
 pub struct BenchArgs {
-    /// What to measure.
+    /// Benchmark to run.
     #[command(subcommand)]
     pub what: What,
 }
 
-/// What to measure.
+/// Benchmark to run.
 #[derive(Debug, Subcommand)]
 pub enum What {
     /// The physics only, under random torques or the recorded controls of a policy. A step is a physics step.

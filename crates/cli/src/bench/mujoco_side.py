@@ -8,7 +8,7 @@ The command runs this text with `python -c` and talks to it in lines of JSON, a 
     {"seconds": s}                                  {"steps": n, "cpu": s, "wall": s, "contacts": x, "broken": n}
 
 Protocol: hinges off by up to 0.1 rad and velocities up to 0.1, warm up, then time steps under uniform random controls
-held for `hold` steps. Nobody is reset. The model's own integrator and solver settings, sensors off, double precision.
+held for `hold` steps. No agent is reset. The model's own integrator and solver settings, sensors off, double precision.
 A scene has `starts` of agents, qpos and qvel, `controls` by decision, [agents][nu] row-major, and `hold`, the steps of a
 decision; with scenes, a repetition is all of them, without a warm-up, and each thread has its own copy of the agents.
 """

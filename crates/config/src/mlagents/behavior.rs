@@ -36,7 +36,7 @@ pub struct Behavior<'a> {
     pub notes: Notes,
 }
 
-/// What the user should know about a file that works.
+/// Notes for the user about a valid file.
 #[derive(Default)]
 pub struct Notes(pub Vec<String>);
 

@@ -163,7 +163,7 @@ pub trait Agent: Send + Sync + 'static {
     /// Checks a model that replaces the agent's own, for agents with a model among their arguments.
     ///
     /// # Errors
-    /// What was found and what was expected.
+    /// The error has the value found and the value expected.
     fn fits(&self, model: &Model) -> Result<(), String> {
         let _ = model;
         Ok(())

@@ -112,9 +112,9 @@ pub struct OptionInfo {
     pub name: &'static str,
     /// Value that this agent has for it.
     pub value: Value,
-    /// What is allowed, such as `a number`.
+    /// Allowed values, such as `a number`.
     pub expected: &'static str,
-    /// What it means.
+    /// Its meaning.
     pub about: &'static str,
     /// Whether it takes a value, see [`OptionInfo::takes`].
     pub reads: fn(&Value) -> bool,
@@ -129,7 +129,7 @@ impl OptionInfo {
 
 /// A type that an argument can have.
 pub trait OptionValue: Sized {
-    /// What is allowed, for error messages.
+    /// Allowed values, for error messages.
     const EXPECTED: &'static str;
     /// As a value.
     fn value(&self) -> Value;

@@ -22,7 +22,7 @@ pub enum GameError {
     Kind {
         /// The file.
         path: PathBuf,
-        /// What it is.
+        /// Kind of the file.
         kind: &'static str,
         /// The words of the command line before the path.
         words: &'static str,

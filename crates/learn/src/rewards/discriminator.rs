@@ -58,7 +58,7 @@ impl Form {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Imitation {
-    /// What it sees, and what its verdict is worth. In files it is the name of the reward.
+    /// Input and reward of the discriminator. In files it is the name of the reward.
     #[serde(skip)]
     pub form: Form,
     /// Widths of the discriminator's hidden layers.

@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// What is rewarded.
+/// Kind of a reward.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RewardKind {
     /// The task's reward.

@@ -65,7 +65,7 @@ struct About {
     state: StateFile,
 }
 
-/// What the description says of a role.
+/// A role in the description.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct AboutRole {
     /// Single numbers of the learner.

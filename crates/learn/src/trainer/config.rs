@@ -317,7 +317,7 @@ impl RunConfig {
 }
 
 impl TrainConfig {
-    /// What the algorithm sees of a run on a task.
+    /// Facts of a run on a task for the algorithm.
     pub(crate) fn setup<'a>(
         &'a self,
         spec: &'a Spec,

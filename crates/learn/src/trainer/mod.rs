@@ -152,14 +152,14 @@ struct Shared {
     spec: Spec,
     /// Each worker's agents.
     collectors: Vec<Mutex<Collector>>,
-    /// What the workers share to teach each role.
+    /// State that the workers share to train each role.
     crews: Vec<Crew>,
     /// The roles, with their settings.
     roles: Vec<RoleParts>,
     /// Where all workers wait for each other.
     barrier: Arc<Barrier>,
     seconds: Vec<Mutex<Seconds>>,
-    /// Those who play elsewhere have given up.
+    /// The remote players have given up.
     stop: AtomicBool,
     /// Whether others play in the place of the collectors, which then only keep the states of the agents.
     elsewhere: AtomicBool,

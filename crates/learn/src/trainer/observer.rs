@@ -39,7 +39,7 @@ impl Snapshot<'_> {
     pub fn checkpoint(&self) -> Checkpoint {
         self.0.checkpoint()
     }
-    /// What the run would return if it ended now, without the statistics.
+    /// The result if the run ended now, without the statistics.
     pub fn output(&self) -> TrainOutput {
         self.0.output(None)
     }

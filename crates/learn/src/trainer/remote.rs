@@ -1,10 +1,10 @@
 //! Rollouts that are played elsewhere: by other processes, on other machines.
 //!
-//! The learner keeps everything that lasts. For each rollout it sends out its *orders*, which are the networks and the
-//! statistics to act with, and to each player the *state* of the agents of its slice; back come what they experienced
-//! and their new state. A player keeps nothing between rollouts, so one that is lost is replaced by any other that gets
-//! the same orders and state and answers with the same bits. What is added up is added up per block, so the policy has
-//! the bits of [`train`](crate::train)'s, however many players there are.
+//! The learner keeps all lasting state. For each rollout it sends its *orders*, which are the networks and the statistics to
+//! act with, and to each player the *state* of the agents of its slice. The players return the rollouts of these agents and
+//! their new state. A player keeps nothing between rollouts. Any other player can therefore replace a lost one: it gets the
+//! same orders and state, and answers with the same bits. All sums are computed per block, so the policy has the bits of
+//! [`train`](crate::train)'s for any number of players.
 //!
 //! All messages are safetensors; nothing in them is code.
 
@@ -64,7 +64,7 @@ impl Message {
 /// Takes in the answer of a slice, and refuses one that does not fit.
 pub type Deliver<'a> = &'a mut dyn FnMut(usize, &[u8]) -> Result<(), Error>;
 
-/// Those who play the agents of a run in the learner's place; see [`train_with`](crate::train_with).
+/// Players that run the agents in the learner's place; see [`train_with`](crate::train_with).
 pub trait Players {
     /// Number of slices that the agents are split into; at most one per block of sixteen agents is used.
     fn slices(&self) -> usize;

@@ -22,7 +22,7 @@ pub struct RoleParts {
     pub spec: Spec,
     /// Its settings, with a seed of its own.
     pub config: TrainConfig,
-    /// What it is to imitate, if it learns to.
+    /// Demonstrations to imitate, if it has an imitation reward.
     demonstrations: Option<Demonstrations>,
 }
 
@@ -61,7 +61,7 @@ impl RoleParts {
         imitations.try_for_each(|imitation| imitation.check(&self.spec, self.demonstrations.as_ref()))
     }
 
-    /// What its algorithm is to learn.
+    /// Setup of its algorithm.
     pub fn setup(&self, isa: Isa) -> Setup<'_> {
         self.config.setup(&self.spec, isa, self.demonstrations.as_ref())
     }
@@ -144,7 +144,7 @@ impl RoleReplica {
         Self { learner: self.learner.replica(), statistics: self.statistics.clone(), average: None }
     }
 
-    /// What it plays with.
+    /// Setup for its rollouts.
     pub fn role_setup(&self, role: &RoleParts) -> RoleSetup<'_> {
         let (seed, lanes) = (role.config.run.seed, self.learner.shape().lanes);
         let metrics = role.spec.own_metrics().cloned().collect();

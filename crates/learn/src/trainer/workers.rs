@@ -14,10 +14,10 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, RwLock, RwLockReadGuard};
 
-/// What the workers of a run share to teach one learner.
+/// State that the workers of a run share to train one learner.
 pub struct Crew {
     isa: Isa,
-    /// What each worker's agents experienced.
+    /// Rollouts of each worker's agents.
     pub rollouts: Vec<RwLock<Rollout>>,
     /// Gradients of the groups of the current list of samples.
     partials: Vec<RwLock<Partial>>,

@@ -29,7 +29,7 @@ pub const MAX_LANES: usize = 16;
 ///
 /// Implementations mark `run` `#[inline(always)]`.
 pub trait Kernel<T: Real> {
-    /// What the work returns.
+    /// Result of the work.
     type Output;
     /// Does the work.
     fn run(self) -> Self::Output;

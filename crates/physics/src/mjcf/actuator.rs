@@ -121,7 +121,7 @@ fn check_range(
     Ok(())
 }
 
-/// What the actuator drives.
+/// Target that the actuator drives.
 fn target(element: &Element, names: &Registry, model: &Model) -> Result<Transmission, MjcfError> {
     let given: Vec<&str> =
         ["joint", "jointinparent", "tendon"].into_iter().filter(|name| element.attr(name).is_some()).collect();

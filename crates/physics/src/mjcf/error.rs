@@ -12,7 +12,7 @@ pub struct MjcfError {
     pub file: String,
     /// Line, counted from 1; 0 when the error concerns the file as a whole.
     pub line: usize,
-    /// What is wrong.
+    /// The problem.
     pub kind: MjcfErrorKind,
 }
 
@@ -73,7 +73,7 @@ pub enum MjcfErrorKind {
         attribute: String,
         /// Its text (shortened when long).
         found: String,
-        /// What it should be.
+        /// Expected value.
         expected: String,
     },
     /// An attribute refers to something that does not exist.
@@ -105,7 +105,7 @@ pub enum MjcfErrorKind {
     Invalid {
         /// The element found.
         element: String,
-        /// What is wrong.
+        /// The problem.
         message: String,
     },
 }

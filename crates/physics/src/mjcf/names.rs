@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 /// The names of one kind of objects, such as joints.
 pub(crate) struct Names<'a> {
-    /// What the objects are called in messages.
+    /// Name of the objects in messages.
     kind: &'static str,
     index: BTreeMap<&'a str, usize>,
 }

@@ -25,7 +25,7 @@ struct Rule {
 enum Inside {
     /// The elements of this list.
     Rules(&'static [Rule]),
-    /// What the world contains, see [`BODY`].
+    /// Children of the world, see [`BODY`].
     Bodies,
     /// Anything: the element is of no consequence.
     Anything,

@@ -5,7 +5,7 @@ use super::math::*;
 use super::settings::GivenStatistics;
 use crate::model::{Geom, GeomType, Model, Vec3};
 
-/// Sets the statistics; `diagonal` is that of the mass matrix. What the file gives takes precedence.
+/// Sets the statistics; `diagonal` is that of the mass matrix. Values from the file take precedence.
 pub(crate) fn compute(model: &mut Model, pose: &Pose, diagonal: &[f64], given: &GivenStatistics) {
     let mut bounds = Bounds { low: [1e10; 3], high: [-1e10; 3] };
     for b in 1..model.bodies.len() {

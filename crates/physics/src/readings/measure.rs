@@ -8,7 +8,7 @@ use crate::lanes::{Kernel, Real};
 use crate::sim::Sim;
 use crate::state::{Group, Work};
 
-/// What to measure of a group besides positions and velocities.
+/// Quantities to measure for a group besides positions and velocities.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct MeasurePlan {
     /// After a step, keep the frames and velocities of bodies, geoms and sites of the last physics step, as MuJoCo's

@@ -17,7 +17,7 @@ pub enum SimError {
         model: String,
         /// The offending element by name.
         what: String,
-        /// What the user can do about it.
+        /// A remedy for the user.
         remedy: String,
     },
     /// The lists of a simulation would take more memory than the [budget](crate::budget) allows.

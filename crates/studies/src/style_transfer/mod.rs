@@ -125,7 +125,7 @@ fn about() -> String {
          Humanoid and Walker learn theirs with `in_style-fast.yaml`. Each run \
          has one seed; the table has medians over the seeds, and each seed's number in brackets if they differ. The \
          policy's best actions are judged over 100 episodes from the clip's first frame and 100 from random ones, each up to \
-         20 s or to the end of a clip that does not loop. An episode is completed if nobody falls and the parts stay within \
+         20 s or to the end of a clip that does not loop. An episode is completed if it has no fall and the parts stay within \
          0.5 m of the clip in the mean. Joint errors, pose errors and slides are those of episodes from the beginning; \
          the pose error is that of table 3 of the AMP paper (Peng et al., 2021), with dynamic time warping. *Once through* is \
          the first policy kept on the way that follows the whole clip, or one cycle of it, in the mean of {EPISODES} episodes \

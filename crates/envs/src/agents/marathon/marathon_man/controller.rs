@@ -106,7 +106,7 @@ fn known_clips() -> Vec<&'static str> {
     CLIPS.into_iter().chain(SKILLS.map(|skill| skill.clip)).collect()
 }
 
-/// What the task includes, by the clips in use.
+/// Skills and gaits that the task includes, by the clips in use.
 #[derive(Clone, Copy, Debug)]
 struct Does {
     /// Locomotion: walking, running and standing.
