@@ -29,6 +29,7 @@ if [ -z "${MARATHON_PYTHON:-}" ]; then
   export MARATHON_PYTHON="$PWD/.venv/bin/python"
 fi
 cargo fmt --all --check
+"$MARATHON_PYTHON" tests/prose/check.py
 if [ -n "$game" ]; then
   tests/types.sh
 fi

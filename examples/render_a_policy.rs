@@ -1,8 +1,8 @@
 //! From a policy file to a picture, by hand.
 //!
-//! This example connects three independent parts: a [`Policy`] maps an observation to an action, a [`VecEnv`] maps an action
-//! to the next state, and a [`Renderer`] draws a state. The renderer needs only `qpos`, the model's configuration, so it can
-//! draw anything that yields `qpos`.
+//! This example connects three independent parts: a [`Policy`] maps an observation to an action, a [`VecEnv`] maps an
+//! action to the next state, and a [`Renderer`] draws a state. The renderer needs only `qpos`, the model's
+//! configuration, so it can draw anything that yields `qpos`.
 //!
 //! The command `marathon render` does the same with more options. There is no GPU in it: the renderer is a ray caster of
 //! spheres, capsules, boxes and a checkered floor.

@@ -1,8 +1,8 @@
 //! An agent that takes commands: a rover that drives at a commanded velocity.
 //!
-//! [`Facts::command`] declares the command. [`Agent::command`] is the agent's own schedule: a new velocity every one to three
-//! seconds, from random numbers that depend only on the agent, its episode and its step. Observation and reward read it
-//! with [`Senses::command`].
+//! [`Facts::command`] declares the command. [`Agent::command`] is the agent's own schedule: a new velocity every one to
+//! three seconds, from random numbers that depend only on the agent, its episode and its step. Observation and reward
+//! read it with [`Senses::command`].
 //!
 //! Other sources can replace the schedule: a program (`steer_an_agent.rs`), a trainer in Python (`own_player.rs`), or a
 //! gamepad (`crates/bevy_marathon/examples/steer.rs`).

@@ -1,8 +1,8 @@
 //! Agents that take commands: rovers, whose agent is [`rover.rs`](rover.rs).
 //!
-//! [`VecEnv::set_command`] takes precedence over the agent's own schedule. The caller may be a gamepad, another learner or a
-//! planner. Here, two lines of control code drive the rovers instead of a network. They find their inputs in the observation
-//! by name.
+//! [`VecEnv::set_command`] takes precedence over the agent's own schedule. The caller may be a gamepad, another learner
+//! or a planner. Here, two lines of control code drive the rovers instead of a network. They find their inputs in the
+//! observation by name.
 //!
 //! ```sh
 //! cargo run --release -p marathon-examples --bin steer_an_agent

@@ -1,5 +1,5 @@
-//! For all calls of a batch and all numbers: nothing panics, states after a step are finite, snapshots are exact, and the lane
-//! width does not change a bit.
+//! For all calls of a batch and all numbers: nothing panics, states after a step are finite, snapshots are exact, and
+//! the lane width does not change a bit.
 
 #![no_main]
 

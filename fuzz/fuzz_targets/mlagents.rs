@@ -1,6 +1,6 @@
-//! Any bytes from a trainer are a message or an error: neither the transport, nor the messages, nor the side channels panic on
-//! them, and side channels that are read are finite. The same holds for demonstration files, whose numbers are those of the
-//! task.
+//! Any bytes from a trainer are a message or an error: neither the transport, nor the messages, nor the side channels
+//! panic on them, and side channels that are read are finite. The same holds for demonstration files, whose numbers are
+//! those of the task.
 
 #![no_main]
 

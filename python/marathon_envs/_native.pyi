@@ -83,7 +83,7 @@ def _clip(name: str, bytes: bytes) -> Clip: ...
 
 @final
 class CommandRange:
-    """One number of what an agent can be told to do: its name, range and unit."""
+    """One number of an agent's command: its name, range and unit."""
 
     def __new__(cls, name: str, low: float, high: float, unit: str = "") -> Self: ...
     @property
@@ -149,7 +149,7 @@ class Spec:
         """Parts of the observation by name, in their order: ``obs[:, spec.observations["touch"]]``."""
     @property
     def command(self) -> list[CommandRange]:
-        """What agents can be told to do, a number each, see `VecEnv.set_command`."""
+        """Commands of the agents, a number each, see `VecEnv.set_command`."""
     @property
     def options(self) -> dict[str, bool | float | tuple[float, float] | str | Clip | list[str | Clip]]:
         """Arguments that the task takes, with the values that it has."""
@@ -255,9 +255,9 @@ class VecEnv:
     ) -> npt.NDArray[Any]:
         """Start new episodes and return the observations, ``(num_envs, obs_size)``.
 
-        A seed starts the random streams anew: the same seed, the same lives. A sequence has a seed, or None, for each
-        agent, which then lives as the only agent of an environment with that seed. With a mask, ``(num_envs,)``, all of
-        this is about the chosen agents alone.
+        A seed restarts the random streams: the same seed gives the same episodes. A sequence has a seed, or None, for
+        each agent, which then acts as the only agent of an environment with that seed. With a mask, ``(num_envs,)``,
+        only the chosen agents are reset.
         """
     def step(
         self, actions: npt.ArrayLike
@@ -307,7 +307,7 @@ class VecEnv:
         """
     @property
     def command(self) -> npt.NDArray[np.float64]:
-        """What each agent was told by the observation that it has, ``(num_envs, len(spec.command))``, a new array."""
+        """Command in each agent's current observation, ``(num_envs, len(spec.command))``, a new array."""
     def set_command(self, command: npt.ArrayLike | None, mask: npt.ArrayLike | None = None) -> None:
         """Tell agents, all or those of a mask, what to do in place of their own schedule; None gives them back to it.
 

@@ -10,9 +10,9 @@ use super::presets::default_for;
 use serde_json::{Map as Object, Value as Json};
 use std::path::Path;
 
-/// Reads the settings of a task from the bytes of a file. Any name of the task works; the path is for messages. In a file
-/// of Marathon's, missing settings come from the task's preset, unless the file has `preset: false`. A file of ML-Agents
-/// has ML-Agents' defaults.
+/// Reads the settings of a task from the bytes of a file. Any name of the task works; the path is for messages. In a
+/// file of Marathon's, missing settings come from the task's preset, unless the file has `preset: false`. A file of
+/// ML-Agents has ML-Agents' defaults.
 ///
 /// # Errors
 /// If the file is no configuration, has no settings for the task, or uses unsupported features. Messages name file, line

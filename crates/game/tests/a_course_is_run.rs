@@ -1,5 +1,5 @@
-//! Assault courses in the game: a policy runs, a player leads a runner, or builds the ground ahead of one by mouse and keys.
-//! Finished runs enter the table of the longest runs, and their replays match them bit for bit, ground included.
+//! Assault courses in the game: a policy runs, a player leads a runner, or builds the ground ahead of one by mouse and
+//! keys. Finished runs enter the table of the longest runs, and their replays match them bit for bit, ground included.
 
 #[path = "common/windowless.rs"]
 mod windowless;

@@ -119,7 +119,8 @@ fn a_second_gamepad_leads_the_next_character() {
     assert!(told[0] == (-2.0, true) && !told[1].1, "{told:?}");
 }
 
-/// Inputs from the command line are held for their duration: keys belong to the first player, a second gamepad to the next.
+/// Inputs from the command line are held for their duration: keys belong to the first player, a second gamepad to the
+/// next.
 #[test]
 fn held_keys_and_sticks_steer() {
     let holds = ["0.4-0.8:key:up", "0.8-1:key:down", "0.6-1.2:pad2:left-y=-0.56", "1.2-1.6:pad2:left-y"];

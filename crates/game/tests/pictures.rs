@@ -1,5 +1,5 @@
-//! Pictures of the game, without a window: a small picture at low quality has a sky above, a checkered ground below and a
-//! character in the middle. The same command draws the same picture. Errors have messages.
+//! Pictures of the game, without a window: a small picture at low quality has a sky above, a checkered ground below and
+//! a character in the middle. The same command draws the same picture. Errors have messages.
 //!
 //! Needs a Vulkan device; a software one will do (Debian: mesa-vulkan-drivers libvulkan1).
 

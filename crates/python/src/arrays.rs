@@ -85,8 +85,8 @@ impl Arrays {
         matches!(self.observations, Observations::Double(_))
     }
 
-    /// Replaces all arrays but `final_obs`, so that callers can keep those of the last step. Arrays of the step before are
-    /// reused if no caller has kept them; others are new.
+    /// Replaces all arrays but `final_obs`, so that callers can keep those of the last step. Arrays of the step before
+    /// are reused if no caller has kept them; others are new.
     pub fn renew(&mut self, py: Python<'_>, agents: usize, spec: &Spec) {
         let double = self.double();
         let mut spare = self.spare.take().unwrap_or_else(|| Box::new(Arrays::new(py, agents, spec, double)));

@@ -6,7 +6,7 @@ use marathon_physics::lanes::Isa;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PySlice};
 
-/// One number of what an agent can be told to do: its name, range and unit.
+/// One number of an agent's command: its name, range and unit.
 #[pyclass(frozen, eq, get_all, module = "marathon_envs")]
 #[derive(Clone, PartialEq)]
 pub struct CommandRange {

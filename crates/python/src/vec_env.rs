@@ -171,9 +171,9 @@ impl VecEnv {
 
     /// Starts new episodes and returns the observations, `(num_envs, obs_size)`.
     ///
-    /// A seed restarts the random streams: the same seed gives the same episodes. A sequence has a seed, or `None`, for each
-    /// agent, which then acts as the only agent of an environment with that seed. With a mask, `(num_envs,)`, only the chosen
-    /// agents are reset.
+    /// A seed restarts the random streams: the same seed gives the same episodes. A sequence has a seed, or `None`, for
+    /// each agent, which then acts as the only agent of an environment with that seed. With a mask, `(num_envs,)`, only
+    /// the chosen agents are reset.
     #[pyo3(signature = (seed = None, mask = None))]
     fn reset(
         &mut self,
@@ -285,9 +285,9 @@ impl VecEnv {
         Ok(self.model.as_ref().expect("it was made").clone_ref(py))
     }
 
-    /// Sets constants of all agents or those of a mask: factors of the bodies' masses and inertias, `(num_envs, nbody)`, of
-    /// all friction coefficients, `(num_envs,)`, and of the actuators' forces, `(num_envs, nu)`; gravity, m/s^2,
-    /// `(num_envs, 3)`. Omitted constants have the model's values. They last over resets, until changed.
+    /// Sets constants of all agents or those of a mask: factors of the bodies' masses and inertias, `(num_envs,
+    /// nbody)`, of all friction coefficients, `(num_envs,)`, and of the actuators' forces, `(num_envs, nu)`; gravity,
+    /// m/s^2, `(num_envs, 3)`. Omitted constants have the model's values. They last over resets, until changed.
     #[pyo3(signature = (*, mass = None, friction = None, strength = None, gravity = None, mask = None))]
     fn vary(
         &mut self,

@@ -1,5 +1,5 @@
-//! Options of runs, policies and films: plain structs that every front end fills. The feature `clap` makes them command-line
-//! arguments, with these texts as the help.
+//! Options of runs, policies and films: plain structs that every front end fills. The feature `clap` makes them
+//! command-line arguments, with these texts as the help.
 
 use crate::error::RunError;
 use crate::policy_file;

@@ -47,7 +47,7 @@ class SkrlEnv(Wrapper):
         return torch.from_numpy(array).to(self._device)
 
     def reset(self) -> tuple[torch.Tensor, dict[str, Any]]:
-        """Start the episodes at the first call. Later calls return the current observations, since agents reset themselves."""
+        """Start the episodes at the first call. Later calls return the current observations, without a reset."""
         if self._obs is None:
             entropy = np.random.SeedSequence().generate_state(1, np.uint64)[0]
             seed = _spaces.native_seed(entropy if self._seed is None else self._seed)

@@ -1,8 +1,8 @@
 //! Skins: a glTF character with a skeleton that a ragdoll wears in place of its shapes.
 //!
-//! A mapping assigns bones to bodies, as for the import of motions. The mappings that come with Marathon include the bone names
-//! of many tools. A bone turns as its body does, and keeps its length. The whole skin is scaled so that its legs are as long
-//! as the ragdoll's.
+//! A mapping assigns bones to bodies, as for the import of motions. The mappings that come with Marathon include the
+//! bone names of many tools. A bone turns as its body does, and keeps its length. The whole skin is scaled so that its
+//! legs are as long as the ragdoll's.
 
 use crate::axes::{to_game, to_physics};
 use crate::look::body::BodyMesh;

@@ -297,8 +297,8 @@ pub trait OptionSet: Clone {
     /// Sets one by name; `false` if there is none of this name or its type does not fit.
     fn put(&mut self, name: &str, value: &Value) -> bool;
 
-    /// The same with some arguments set. Unknown names and values of the wrong type are ignored; the registry refuses them
-    /// earlier.
+    /// The same with some arguments set. Unknown names and values of the wrong type are ignored; the registry refuses
+    /// them earlier.
     fn with(&self, options: &Options) -> Self {
         let mut set = self.clone();
         for (name, value) in options.iter() {

@@ -37,7 +37,8 @@ pub(crate) use saved::{load_adam, save_adam};
 use schedule::Progress;
 use std::ops::Range;
 
-/// Algorithm that learns from the rollouts, with its own settings. In files, the section with these settings has its name.
+/// Algorithm that learns from the rollouts, with its own settings. In files, the section with these settings has its
+/// name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Algorithm {
     /// Proximal policy optimization.

@@ -8,7 +8,8 @@ use crate::lanes::BLOCK;
 use marathon_physics::lanes::Isa;
 use std::hint::black_box;
 
-/// Bytes of everything else, such as environments and checkpoints in writing, per byte of the large arrays: the most measured.
+/// Bytes of everything else, such as environments and checkpoints in writing, per byte of the large arrays: the most
+/// measured.
 const REST: f64 = 0.3;
 
 /// Refuses a run that does not fit into memory.

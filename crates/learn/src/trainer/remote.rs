@@ -1,10 +1,10 @@
 //! Rollouts that are played elsewhere: by other processes, on other machines.
 //!
-//! The learner keeps all lasting state. For each rollout it sends its *orders*, which are the networks and the statistics to
-//! act with, and to each player the *state* of the agents of its slice. The players return the rollouts of these agents and
-//! their new state. A player keeps nothing between rollouts. Any other player can therefore replace a lost one: it gets the
-//! same orders and state, and answers with the same bits. All sums are computed per block, so the policy has the bits of
-//! [`train`](crate::train)'s for any number of players.
+//! The learner keeps all lasting state. For each rollout it sends its *orders*, which are the networks and the
+//! statistics to act with, and to each player the *state* of the agents of its slice. The players return the rollouts
+//! of these agents and their new state. A player keeps nothing between rollouts. Any other player can therefore replace
+//! a lost one: it gets the same orders and state, and answers with the same bits. All sums are computed per block, so
+//! the policy has the bits of [`train`](crate::train)'s for any number of players.
 //!
 //! All messages are safetensors; nothing in them is code.
 

@@ -8,7 +8,8 @@ use crate::rollout::states::{AgentStates, SeatStates};
 const OF_AGENTS: [&str; 3] = ["action", "env", "env_ends"];
 const OF_SEATS: [&str; 4] = ["noise", "obs", "tallies", "decides"];
 
-/// Prefix of the names of a role's lists. The first role has none, so that the file of a task with one role names no role.
+/// Prefix of the names of a role's lists. The first role has none, so that the file of a task with one role names no
+/// role.
 pub fn prefix(number: usize, role: &str) -> String {
     if number == 0 { String::new() } else { format!("{role}/") }
 }

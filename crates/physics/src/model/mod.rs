@@ -185,8 +185,8 @@ pub enum Integrator {
     Rk4,
     /// `implicit`; parsed and refused by the simulator for now.
     Implicit,
-    /// `implicitfast`. The simulator refuses it in a medium with density or viscosity, with damped tendons, and with velocity
-    /// feedback of actuators on tendons.
+    /// `implicitfast`. The simulator refuses it in a medium with density or viscosity, with damped tendons, and with
+    /// velocity feedback of actuators on tendons.
     ImplicitFast,
 }
 
