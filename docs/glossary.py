@@ -14,36 +14,44 @@ import json
 import re
 import subprocess
 import sys
-from collections import defaultdict
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs/glossary.md"
-KINDS = ["command line", "task option", "configuration", "Python"]
 LEFT_OUT = {"self", "cls", "args", "kwargs", "help", "version"}
-# a word, one of the kinds above, and the place: a command, a task, a section or a class or function
+# a word, its kind (command line, task option, configuration or Python), and its command, task, section or class
 Found = tuple[str, str, str]
+
+
+def output(*command: str) -> str:
+    """Output of a program."""
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
 
 def command_line(program: str, *path: str) -> Iterator[Found]:
     """Commands and long options, from the help of a command and its subcommands."""
-    text = subprocess.run([program, *path, "--help"], capture_output=True, text=True, check=True).stdout
-    place = " ".join(path) or "marathon"
-    for option in re.findall(r"^ +(?:-\w, )?--([a-z][\w-]*)", text, re.MULTILINE):
-        yield option, "command line", place
-    commands = re.search(r"^Commands:\n((?: .*\n)+)", text, re.MULTILINE)
-    for command in re.findall(r"^  ([a-z][\w-]*)", commands[1], re.MULTILINE) if commands else []:
-        if command not in LEFT_OUT:
-            yield command, "command line", place
-            yield from command_line(program, *path, command)
+    text = output(program, *path, "--help")
+    commands = re.findall(r"^  ([a-z][\w-]*)", text.partition("\nCommands:\n")[2].partition("\n\n")[0], re.MULTILINE)
+    for word in [*commands, *re.findall(r"^ +(?:-\w, )?--([a-z][\w-]*)", text, re.MULTILINE)]:
+        yield word, "command line", " ".join(path) or "marathon"
+    for command in commands:
+        # the game is a program of its own, which need not be built: its source has the options
+        if command != "help":
+            yield from game_options("Args") if command == "play" else command_line(program, *path, command)
 
 
-def task_options(tasks: list[dict]) -> Iterator[Found]:
-    """Options of tasks, from `marathon list`."""
-    for task in tasks:
-        for option in task["options"]:
-            yield option["name"], "task option", task["id"]
+def game_options(struct: str) -> Iterator[Found]:
+    """Long options of `marathon play`: fields of a struct, and of those that it flattens."""
+    files = [ROOT / "crates/game/src/app/cli.rs", *sorted((ROOT / "crates/runs/src").glob("*.rs"))]
+    code = re.sub(r"^ *///.*\n", "", "".join(path.read_text() for path in files), flags=re.MULTILINE)
+    body = code.partition(f"pub struct {struct} {{\n")[2].partition("\n}")[0]
+    for attributes, field, kind in re.findall(r"((?:^ {4}[^p].*\n)+) {4}pub (\w+): (\w+)", body, re.MULTILINE):
+        if "flatten" in attributes:
+            yield from game_options(kind)
+        elif long := re.search(r'\blong\b(?: = "([\w-]+)")?', attributes):
+            yield long[1] or field, "command line", "play"
 
 
 def keys(value: dict, section: str = "the file") -> Iterator[Found]:
@@ -63,90 +71,67 @@ def configuration(program: str, tasks: list[dict]) -> Iterator[Found]:
     for line in page.partition("<!-- all keys")[2].splitlines():
         name, *cells = [cell.strip("` ") for cell in line.strip("|").split("|")]
         if line.startswith("### "):
-            heading = name.strip("# `") if "`, `" not in name and "`" in name else "the file"
+            heading = name.strip("# `") if line.count("`") == 2 else "the file"
         elif name == "key":
             sections = [cell.replace("default", heading) for cell in cells[:-2]]
-            parent = "rewards" if "amp" in sections else "the file"
-            yield from ((section, "configuration", parent) for section in sections if section != parent)
         elif line.startswith("| `"):
-            used = [section for section, cell in zip(sections, cells, strict=False) if cell]
-            yield from ((key, "configuration", section) for section in used for key in name.split("."))
+            for section in (section for section, cell in zip(sections, cells, strict=False) if cell):
+                if section != "the file":
+                    yield section, "configuration", "rewards" if "amp" in sections else "the file"
+                yield from ((key, "configuration", section) for key in name.split("."))
     for task in tasks:
-        text = subprocess.run([program, "--json", "config", "show", task["id"]], capture_output=True, check=True).stdout
-        yield from keys(json.loads(text))
+        yield from keys(json.loads(output(program, "--json", "config", "show", task["id"])))
 
 
-def python(path: Path) -> Iterator[Found]:
-    """Public names of a module: classes, functions, methods, parameters, and fields of classes."""
-
-    def function(node: ast.FunctionDef, owner: str) -> Iterator[Found]:
-        special = node.name in ("__new__", "__init__", "__call__")
-        if node.name.startswith("_") and not special:
-            return
-        if not special:
-            yield node.name, "Python", owner or path.stem
-        inputs = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs, node.args.vararg, node.args.kwarg]
-        for parameter in filter(None, inputs):
-            yield parameter.arg, "Python", owner or node.name
-
-    for node in ast.parse(path.read_text()).body:
-        if isinstance(node, ast.FunctionDef):
-            yield from function(node, "")
-        elif isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-            yield node.name, "Python", path.stem
-            for member in node.body:
-                if isinstance(member, ast.FunctionDef):
-                    yield from function(member, node.name)
-                elif isinstance(member, ast.AnnAssign) and isinstance(member.target, ast.Name):
-                    yield member.target.id, "Python", node.name
+def python(nodes: list[ast.stmt], owner: str, of_class: bool = False) -> Iterator[Found]:
+    """Public names of a module or class: classes, functions, methods, parameters, and fields."""
+    for node in nodes:
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+            yield node.name, "Python", owner
+            yield from python(node.body, node.name, True)
+        elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+            yield node.target.id, "Python", owner
+        elif isinstance(node, ast.FunctionDef) and re.match(r"[^_]|__(new|init|call)__", node.name):
+            yield node.name, "Python", owner
+            inputs = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs, node.args.vararg, node.args.kwarg]
+            yield from ((entry.arg, "Python", owner if of_class else node.name) for entry in inputs if entry)
 
 
 def collect(program: str) -> dict[str, dict[str, list[str]]]:
     """All words, with the places of each by kind. `--initialize-from` and `initialize_from` are one word."""
-    tasks = json.loads(subprocess.run([program, "--json", "list"], capture_output=True, check=True).stdout)["agents"]
-    modules = [p for p in sorted((ROOT / "python/marathon_envs").rglob("*.py*")) if p.suffix in (".py", ".pyi")]
-    public = [p for p in modules if p.name == "_native.pyi" or not p.name.startswith("_")]
-    words: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
-    sources = [command_line(program), task_options(tasks), configuration(program, tasks), *map(python, public)]
-    for word, kind, place in (found for source in sources for found in source):
-        word = word.replace("-", "_")
-        if word not in LEFT_OUT and not word.startswith("_") and place not in words[word][kind]:
-            words[word][kind].append(place)
+    tasks = json.loads(output(program, "--json", "list"))["agents"]
+    options = ((option["name"], "task option", task["id"]) for task in tasks for option in task["options"])
+    files = [ROOT / "python/marathon_envs/_native.pyi", *sorted((ROOT / "python/marathon_envs").rglob("[!_]*.py"))]
+    modules = [python(ast.parse(f.read_text()).body, f.stem.replace("_native", "marathon_envs")) for f in files]
+    words: dict[str, dict[str, list[str]]] = {}
+    for source in [command_line(program), options, configuration(program, tasks), *modules]:
+        for name, kind, place in source:
+            if name not in LEFT_OUT and not name.startswith("_"):
+                places = words.setdefault(name.replace("-", "_"), {}).setdefault(kind, [])
+                places += [place] if place not in places else []
     return words
 
 
-def rows() -> Iterator[tuple[str, str, str]]:
-    """Words, meanings and places of the page's table."""
+def rows() -> list[list[str]]:
+    """Word, meaning and place of each row of the page's table."""
     table = PAGE.read_text().partition("| word | meaning | where |\n|---|---|---|\n")[2]
-    for line in filter(None, table.splitlines()):
-        word, meaning, where = re.split(r" *(?<!\\)\| *", line.strip("| "))
-        yield word.strip("`"), meaning, where
-
-
-def row(word: str, kinds: dict[str, list[str]], meaning: str = "") -> str:
-    """A row of the table. Places are named if there are at most three of a kind."""
-    named = {kind: places if len(places) <= 3 and kind != "task option" else [] for kind, places in kinds.items()}
-    where = [f"{kind}: {', '.join(named[kind])}" if named[kind] else kind for kind in KINDS if kind in named]
-    return f"| `{word}` | {meaning} | {'; '.join(where)} |"
+    return [[cell.strip("` ") for cell in line.strip("|").split(" | ")] for line in filter(None, table.splitlines())]
 
 
 def problems(words: dict[str, dict[str, list[str]]]) -> Iterator[str]:
     """Each word without a row, and each row that is out of date."""
     missing = {(word, kind): places for word, kinds in words.items() for kind, places in kinds.items()}
-    lines = list(rows())
-    for word, meaning, where in lines:
+    for word, meaning, where in rows():
         for kind, _, named in (entry.partition(": ") for entry in where.split("; ")):
             missing.pop((word, kind), None)
             places = words.get(word, {}).get(kind, [])
-            gone = [place for place in named.split(", ") if named and place not in places]
-            if not places or gone:
-                yield f"{PAGE.name}: `{word}` is not found: {kind} {', '.join(gone)}"
-        if not meaning:
-            yield f"{PAGE.name}: `{word}` has no meaning"
+            if not places or named and not set(named.split(", ")) <= set(places):
+                yield f"`{word}` is in the glossary, but not found there: {kind} {named}"
+        yield from [] if meaning else [f"`{word}` has no meaning in the glossary"]
     for (word, kind), places in sorted(missing.items()):
-        yield f"{PAGE.name}: `{word}` has no row: {kind} {', '.join(places)}"
-    names = [word.lower() for word, _, _ in lines]
-    yield from (f"{PAGE.name}: `{b}` is not in its place: after {a}" for a, b in zip(names, names[1:]) if a > b)
+        yield f"`{word}` is not in the glossary: {kind} {', '.join(places)}"
+    names = [word.lower() for word, _, _ in rows()]
+    yield from (f"`{b}` is out of order after `{a}`" for a, b in pairwise(names) if a > b)
 
 
 if __name__ == "__main__":
@@ -156,7 +141,8 @@ if __name__ == "__main__":
     options = parser.parse_args()
     words = collect(options.program)
     if options.check:
-        found = list(problems(words))
-        sys.exit("\n".join(found) if found else 0)
-    known = {word for word, _, _ in rows()}
-    print("\n".join(row(word, words[word]) for word in sorted(words, key=str.lower) if word not in known))
+        sys.exit("\n".join(problems(words)) or 0)
+    for word in sorted(words.keys() - {word for word, _, _ in rows()}, key=str.lower):
+        few = {kind: len(at) <= 3 and kind != "task option" for kind, at in words[word].items()}
+        where = "; ".join(f"{kind}: {', '.join(at)}" if few[kind] else kind for kind, at in words[word].items())
+        print(f"| `{word}` |  | {where} |")
