@@ -124,7 +124,7 @@ def problems(words: dict[str, dict[str, list[str]]]) -> Iterator[str]:
         for kind, _, named in (entry.partition(": ") for entry in where.split("; ")):
             missing.pop((word, kind), None)
             places = words.get(word, {}).get(kind, [])
-            if not places or named and not set(named.split(", ")) <= set(places):
+            if not places or (named and not set(named.split(", ")) <= set(places)):
                 yield f"`{word}` is in the glossary, but not found there: {kind} {named}"
         yield from [] if meaning else [f"`{word}` has no meaning in the glossary"]
     for (word, kind), places in sorted(missing.items()):
