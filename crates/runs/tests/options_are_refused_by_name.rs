@@ -66,7 +66,7 @@ fn a_front_end_spells_options_and_advice() {
     let stopped = RunError::Stopped { cause, folder: "runs/a".into(), steps: 9000, saved: Some(8000) };
     let [plain, flags] = told(&stopped);
     assert!(
-        plain.starts_with("seed belongs") && flags.starts_with("--seed belongs"),
+        plain.starts_with("seed is for new runs") && flags.starts_with("--seed is for new runs"),
         "the cause is spelled, too: {flags}"
     );
     assert!(
