@@ -246,8 +246,15 @@ fn unknown(entry: Entry<'_>, known: &[&str], path: &str) -> ConfigError {
 
 /// Arguments of the task. Whether it takes them, the task knows.
 fn options(section: &Section<'_>) -> Result<Value, ConfigError> {
+    let expected = "a number, a word, true or false, or a range such as [0.8, 2]";
     let read = |entry: Entry<'_>| {
-        let text = entry.word_of_any_kind("a number, a word, true or false")?;
+        let text = match &entry.node.value {
+            Yaml::List(ends) if ends.len() == 2 => {
+                let [low, high] = [&entry.items(expected)?[0], &entry.items(expected)?[1]];
+                format!("({}, {})", low.number(Range::Finite)?, high.number(Range::Finite)?)
+            }
+            _ => entry.word_of_any_kind(expected)?,
+        };
         Ok((entry.key.to_string(), Value::String(text)))
     };
     section.entries().map(read).collect::<Result<_, _>>().map(Value::Object)

@@ -118,7 +118,7 @@ impl Loaded {
     pub fn document(&self) -> Object<String, Json> {
         let mut all = object(&self.config);
         all.extend(self.of_run());
-        let options = self.options.iter().map(|(name, value)| (name.clone(), value.to_string().into()));
+        let options = self.options.iter().map(|(name, value)| (name.clone(), written(value)));
         let options: Object<String, Json> = options.collect();
         if !options.is_empty() {
             all.insert(OPTIONS.into(), options.into());
@@ -143,6 +143,16 @@ impl Loaded {
 /// Settings as a file in YAML.
 pub fn to_yaml(document: &Object<String, Json>) -> String {
     yaml::document(document, &keys::rank)
+}
+
+/// An argument of a task as a file has it.
+fn written(value: &Value) -> Json {
+    match value {
+        Value::Bool(x) => (*x).into(),
+        Value::Number(x) if x.is_finite() => (*x).into(),
+        Value::Text(text) => text.as_str().into(),
+        Value::Number(_) | Value::Pair(_) => value.to_string().into(),
+    }
 }
 
 /// A configuration as JSON.

@@ -125,7 +125,7 @@ run: {seed: 18446744073709551615, policy_average: 0.1, total_steps: 1234567}
 rewards: {curiosity: {}, gail: {demonstrations: 'a b.demo', observations: [touch]}, amp: {actions: true, logit_decay: 0}}
 ppo: {ratio: per_action, value_clip: 0.25, lr_range: [1e-7, 0.1], clip: {to: 0.012345678901234567}}
 roles: {builder: {a2c: {}, network: {initialization: ml_agents}, statistics: {scale_rewards: false}}}
-options: {clip: 'my clip.bvh', price: 1e-3, flag: true}
+options: {clip: 'my clip.bvh', price: 1e-3, flag: true, range: [0.8, 2], open: '(0.7, inf)', far: inf}
 ";
     all.push(("fancy".into(), read(fancy, "hopper")));
     for (name, loaded) in all {
