@@ -316,5 +316,6 @@ pub fn elsewhere(name: &str) -> Option<String> {
 /// The place of a key or section in the order of the reference.
 pub fn rank(path: &str) -> usize {
     let within = |known: &str| known.strip_prefix(path).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
-    KEYS.iter().position(|key| paths(key).any(|known| within(&known))).unwrap_or(KEYS.len())
+    let all = all();
+    all.iter().position(|known| within(known)).unwrap_or(all.len())
 }

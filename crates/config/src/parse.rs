@@ -54,7 +54,7 @@ pub fn set(loaded: Loaded, text: &str) -> Result<Loaded, ConfigError> {
     let own = loaded.config.algorithm.name();
     match layer.algorithm().filter(|name| *name != own) {
         Some(other) => {
-            let place = layer.place(other).cloned().unwrap_or_else(|| Place::of("--set", other));
+            let place = Place::of("--set", text.split('=').next().unwrap_or(other));
             Err(ConfigError::value(place, other, format!("{own}, the algorithm of this configuration")))
         }
         None => loaded.with(&layer, Path::new("--set")),
