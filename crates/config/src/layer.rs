@@ -250,8 +250,8 @@ fn options(section: &Section<'_>) -> Result<Value, ConfigError> {
     let read = |entry: Entry<'_>| {
         let text = match &entry.node.value {
             Yaml::List(ends) if ends.len() == 2 => {
-                let [low, high] = [&entry.items(expected)?[0], &entry.items(expected)?[1]];
-                format!("({}, {})", low.number(Range::Finite)?, high.number(Range::Finite)?)
+                let ends = entry.items(expected)?;
+                format!("({}, {})", ends[0].number(Range::Finite)?, ends[1].number(Range::Finite)?)
             }
             _ => entry.word_of_any_kind(expected)?,
         };
