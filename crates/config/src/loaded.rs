@@ -151,6 +151,8 @@ fn written(value: &Value) -> Json {
         Value::Bool(x) => (*x).into(),
         Value::Number(x) if x.is_finite() => (*x).into(),
         Value::Text(text) => text.as_str().into(),
+        // a file names its clips
+        Value::Clips(clips) => clips.to_string().into(),
         Value::Number(_) | Value::Pair(_) => value.to_string().into(),
     }
 }
