@@ -1,4 +1,4 @@
-"""PyTorch's gradients of a discriminator's loss, whose penalty takes second derivatives.
+"""A discriminator's loss and its gradient in PyTorch; the penalty takes second derivatives.
 
 Reads a JSON list of cases from standard input:
     {"form": "amp" or "gail", "activation": name, "sizes": [...], "params": [...], "own": [[...]], "expert": [[...]],

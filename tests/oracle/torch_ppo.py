@@ -1,4 +1,4 @@
-"""PyTorch's gradients of PPO's objective.
+"""Losses and gradients of PPO's objective in PyTorch.
 
 Reads a JSON list of cases from standard input, one per activation and kind of value loss:
     {"activation": name, "sizes": {"actor": [...], "critic": [...]}, "params": {"actor": [...], "critic": [...]},

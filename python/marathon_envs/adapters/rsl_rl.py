@@ -15,7 +15,7 @@ class RslRlEnv(VecEnv):
     """Many agents for rsl_rl's runners.
 
     Observations are the group "policy", `(num_envs, obs_size)`. Agents whose episode ended are reset within the same
-    step; `extras["time_outs"]` marks episodes that ended by time, and `extras["log"]` has the means of the reward's terms.
+    step; `extras["time_outs"]` marks episodes that ended by time. `extras["log"]` has the means of the reward terms.
 
         runner = OnPolicyRunner(RslRlEnv("Hopper-v0", 1024), {"obs_groups": {"actor": ["policy"], ...}, ...})
     """
