@@ -70,7 +70,8 @@ def test_a_clip_is_a_value(tmp_path: Path) -> None:
     again = pickle.loads(pickle.dumps(envs[1]))  # noqa: S301
     np.testing.assert_array_equal(again.reset(seed=3), envs[1].reset(seed=3))
     policy = train("MarathonMan-v0", options={"clip": mine}, **SMALL).policy
-    np.testing.assert_array_equal(VecEnv(policy.task, 3, **policy.options).reset(seed=2), envs[0].reset(seed=2))
+    mine_again = VecEnv(policy.task, 3, **{**policy.options, "clip": mine})
+    np.testing.assert_array_equal(VecEnv(policy.task, 3, **policy.options).reset(seed=2), mine_again.reset(seed=2))
 
 
 def test_wrong_arguments_are_refused_by_name() -> None:
