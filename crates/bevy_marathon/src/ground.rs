@@ -49,7 +49,7 @@ impl Ground {
     pub const ALL: [Ground; 4] = [Ground::Level, Ground::Hills, Ground::Stairs, Ground::Boards];
 
     /// Its name on the screen, on the command line and in recordings.
-    pub fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Ground::Level => "level",
             Ground::Hills => "hills",

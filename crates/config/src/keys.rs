@@ -308,14 +308,11 @@ pub fn all() -> Vec<String> {
 pub fn elsewhere(name: &str) -> Option<String> {
     let known = |path: &String| path.rsplit('.').next().is_some_and(|last| last.eq_ignore_ascii_case(name));
     // a reward's network has a learning rate, too, which is hardly meant
-    let mut found: Vec<String> = all().into_iter().filter(known).collect();
-    found.sort_by_key(|path| path.starts_with("rewards."));
-    found.into_iter().next()
+    KEYS.iter().flat_map(paths).filter(known).min_by_key(|path| path.starts_with("rewards."))
 }
 
 /// The place of a key or section in the order of the reference.
 pub fn rank(path: &str) -> usize {
     let within = |known: &str| known.strip_prefix(path).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
-    let all = all();
-    all.iter().position(|known| within(known)).unwrap_or(all.len())
+    KEYS.iter().flat_map(paths).position(|known| within(&known)).unwrap_or(usize::MAX)
 }

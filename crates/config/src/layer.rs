@@ -50,8 +50,9 @@ impl File {
         let root = Section::root(path, map);
         let shared = Layer::read(&root, Part::File)?;
         let mut tasks = Vec::new();
-        for entry in root.section(TASKS)?.entries() {
-            let section = root.section(TASKS)?.section(entry.key)?;
+        let sections = root.section(TASKS)?;
+        for entry in sections.entries() {
+            let section = sections.section(entry.key)?;
             tasks.push((entry.key.to_string(), Layer::read(&section, Part::Task)?));
         }
         let preset = root.flag(PRESET, true)?;

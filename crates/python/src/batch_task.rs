@@ -147,7 +147,7 @@ pub fn lockstep(env: &Bound<'_, PyAny>) -> PyResult<BatchAdapter> {
     Ok(BatchAdapter::new(Box::new(batch_task), spec, agents))
 }
 
-/// Runs `f` without the GIL. If a batch_task fails in Python meanwhile, that is the error.
+/// Runs `f` without the GIL. If a batch task fails in Python meanwhile, that is the error.
 pub fn run<R: Send>(py: Python<'_>, batch_task: Option<&BatchAdapter>, f: impl FnOnce() -> R + Send) -> PyResult<R> {
     let result = py.detach(AssertUnwindSafe(|| catch_unwind(AssertUnwindSafe(f))));
     result.map_err(|panic| match batch_task.and_then(BatchAdapter::take_error).map(|e| e.downcast::<PyErr>()) {

@@ -32,7 +32,7 @@ pub fn plain(name: &str) -> &str {
 #[derive(Default)]
 pub struct Made {
     pub batch_task: Option<Arc<BatchAdapter>>,
-    /// Why there is no batch_task.
+    /// Why there is no batch task.
     pub error: Option<PyErr>,
 }
 
@@ -45,7 +45,7 @@ impl Task {
         }
     }
 
-    /// The task of a run; `made` learns of a batch_task that is made for it.
+    /// The task of a run; `made` learns of a batch task that is made for it.
     pub fn of_run<'a>(
         &'a self,
         py: Python<'a>,

@@ -56,8 +56,8 @@ impl CameraMode {
         }
     }
 
-    /// Its name on the screen.
-    pub fn name(self) -> &'static str {
+    /// Its name on the screen and on the command line.
+    pub const fn name(self) -> &'static str {
         match self {
             CameraMode::Side => "side",
             CameraMode::Chase => "chase",

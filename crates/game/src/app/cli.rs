@@ -327,10 +327,10 @@ fn course_options(args: &Args) -> Result<CourseOptions, GameError> {
 type Choice<T> = (&'static str, T, &'static str);
 
 const GROUNDS: [Choice<Ground>; 4] = [
-    ("level", Ground::Level, "Level, as in training"),
-    ("hills", Ground::Hills, "Waves that grow to 60 cm"),
-    ("stairs", Ground::Stairs, "Flights of five steps, up and down"),
-    ("boards", Ground::Boards, "Low boards across the track"),
+    (Ground::Level.name(), Ground::Level, "Level, as in training"),
+    (Ground::Hills.name(), Ground::Hills, "Waves that grow to 60 cm"),
+    (Ground::Stairs.name(), Ground::Stairs, "Flights of five steps, up and down"),
+    (Ground::Boards.name(), Ground::Boards, "Low boards across the track"),
 ];
 
 const QUALITIES: [Choice<Quality>; 3] = [
@@ -340,9 +340,9 @@ const QUALITIES: [Choice<Quality>; 3] = [
 ];
 
 const CAMERAS: [Choice<CameraMode>; 3] = [
-    ("side", CameraMode::Side, "Beside the runner"),
-    ("chase", CameraMode::Chase, "Behind it"),
-    ("orbit", CameraMode::Orbit, "Around it"),
+    (CameraMode::Side.name(), CameraMode::Side, "Beside the runner"),
+    (CameraMode::Chase.name(), CameraMode::Chase, "Behind it"),
+    (CameraMode::Orbit.name(), CameraMode::Orbit, "Around it"),
 ];
 
 /// Reads one of the choices by its name.

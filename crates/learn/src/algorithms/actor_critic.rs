@@ -257,10 +257,10 @@ impl ActorCritic {
             // the first chunk needs no sum
             let gradient = if i == 0 { &mut partial.gradient } else { &mut space.gradient };
             let networks = layout.streams.iter().filter_map(|stream| stream.networks.as_ref());
-            for (networks, judge) in networks.zip(&mut space.judges) {
+            for (networks, reward_model) in networks.zip(&mut space.reward_models) {
                 let place = networks.place.clone();
                 let minibatch = Minibatch { items: chunk, ..minibatch };
-                judge.gradient(isa, &self.params[place.clone()], &steps, &minibatch, &mut gradient[place]);
+                reward_model.gradient(isa, &self.params[place.clone()], &steps, &minibatch, &mut gradient[place]);
             }
             let (of_actor, of_critic) = gradient.split_at_mut(layout.critic_start);
             let (of_net, of_std) = of_actor.split_at_mut(layout.actor.len());
@@ -341,7 +341,7 @@ pub struct Space {
     input: Blocks<f32>,
     actor: Tape<f32>,
     critic: Tape<f32>,
-    judges: Vec<Box<dyn RewardModel>>,
+    reward_models: Vec<Box<dyn RewardModel>>,
     /// Gradient of all parameters.
     pub gradient: Vec<f32>,
     moments: Vec<f32>,
@@ -356,7 +356,7 @@ impl Space {
             input: layout.actor.input(),
             actor: layout.actor.tape(),
             critic: layout.critic.tape(),
-            judges: networks.map(|networks| networks.reward.reward_model()).collect(),
+            reward_models: networks.map(|networks| networks.reward.reward_model()).collect(),
             gradient: vec![0.0; layout.places.total()],
             moments: vec![0.0; moments],
             rows: vec![[0.0; BLOCK]; layout.shape.act],

@@ -48,7 +48,7 @@ pub struct RoleRollout {
     obs_sums: [Aligned<f32>; 2],
     space: ActingSpace,
     tape: Option<Tape<f32>>,
-    judges: Vec<Option<Box<dyn RewardModel>>>,
+    reward_models: Vec<Option<Box<dyn RewardModel>>>,
 }
 
 impl RoleRollout {
@@ -69,7 +69,11 @@ impl RoleRollout {
             obs_sums: [Aligned::new(blocks * n), Aligned::new(blocks * n)],
             space: with.acting.space(role.act.len()),
             tape: with.values.as_ref().map(|values| values.net.inference_tape()),
-            judges: with.streams.iter().map(|s| s.networks.as_ref().map(|nets| nets.reward.reward_model())).collect(),
+            reward_models: with
+                .streams
+                .iter()
+                .map(|s| s.networks.as_ref().map(|nets| nets.reward.reward_model()))
+                .collect(),
             role,
         }
     }
@@ -235,14 +239,14 @@ impl RoleRollout {
     fn reward_model(&mut self, with: &RolloutContext<'_>, rollout: &mut Rollout) {
         let (items, streams, blocks) = (rollout.items(), rollout.streams, self.blocks());
         let mut rows = vec![0.0; CHUNK * BLOCK];
-        for (s, (stream, judge)) in with.streams.iter().zip(&mut self.judges).enumerate() {
-            let (Some(networks), Some(judge)) = (&stream.networks, judge) else { continue };
+        for (s, (stream, reward_model)) in with.streams.iter().zip(&mut self.reward_models).enumerate() {
+            let (Some(networks), Some(reward_model)) = (&stream.networks, reward_model) else { continue };
             let params = &with.params[networks.place.clone()];
             let (strength, most) = (stream.strength as f32, (networks.reward.bound() / stream.strength) as f32);
             for first in (0..items).step_by(CHUNK) {
                 let n = CHUNK.min(items - first);
                 let steps: Vec<Step<'_, f32>> = (first..first + n).map(|item| rollout.step(item)).collect();
-                judge.reward(with.acting.isa, params, &steps, &mut rows);
+                reward_model.reward(with.acting.isa, params, &steps, &mut rows);
                 for (item, row) in (first..first + n).zip(rows.chunks_exact(BLOCK)) {
                     let out = &mut rollout.reward[(item * streams + s) * BLOCK..][..BLOCK];
                     for (out, x) in out.iter_mut().zip(row) {

@@ -1,5 +1,7 @@
 //! The character's parts, joints and motors, and its model for each kind of control.
 
+use std::sync::LazyLock;
+
 use marathon_physics::Model;
 use marathon_physics::mjcf::MjcfError;
 use marathon_physics::spec::{Actuator, Kind, ModelSpec};
@@ -156,14 +158,26 @@ impl Choice for Control {
 
 /// The model with the actuators for a kind of control.
 pub fn model(control: Control) -> ModelSource {
-    match control {
-        Control::Torque => MODEL.into(),
-        _ => servos(control).expect("the figure has a motor for each joint").into(),
-    }
+    // the registry reads the facts of every task at the start, so the edits are made once, when they are needed
+    static PD: LazyLock<String> = LazyLock::new(|| servos(Control::Pd));
+    static PD_RANGE: LazyLock<String> = LazyLock::new(|| servos(Control::PdRange));
+    static SERVO: LazyLock<String> = LazyLock::new(|| servos(Control::Servo));
+    let text: &'static str = match control {
+        Control::Pd => &PD,
+        Control::PdRange => &PD_RANGE,
+        Control::Torque => MODEL,
+        Control::Servo => &SERVO,
+    };
+    text.into()
+}
+
+/// MJCF of the model with servos in place of its motors.
+fn servos(control: Control) -> String {
+    with_servos(control).expect("the figure has a motor for each joint").to_xml()
 }
 
 /// The model with servos in place of its motors, and without the original's drive, which they replace.
-fn servos(control: Control) -> Result<ModelSpec, MjcfError> {
+fn with_servos(control: Control) -> Result<ModelSpec, MjcfError> {
     let mut spec = ModelSpec::from_xml_str(MODEL, "marathon_man")?;
     spec.default_mut("main", "joint")?.unset("damping")?.unset("stiffness")?;
     let ranges = (control == Control::PdRange).then(middles_and_halves);
