@@ -47,14 +47,14 @@ for agent in "${wanted[@]}"; do
       ;;
     MarathonManSteer)
       # to stand still, with less noise; then not to fall
-      learn "${steadily[@]}" "$last-goes" --option relive=0 --option seconds=20 --seed 1 --out "$last-stands"
+      learn "${steadily[@]}" "$last-goes" --option replay_falls_prob=0 --option seconds=20 --seed 1 --out "$last-stands"
       learn "${steadily[@]}" "$last-stands"/policies/policy-80*.safetensors --seed 2 --out "$last"
       # who plays starts from a stand, and is not asked for extremes half of the time
-      mean --option start=first --option commands=even --option price=20 --option seconds=20
+      mean --option start=first --option commands=even --option fall_penalty=20 --option seconds=20
       ;;
     *)
       learn "${steadily[@]}" "$last-goes" --seed "$seed" --out "$last"
-      mean --option price=40 --option relive=0
+      mean --option fall_penalty=40 --option replay_falls_prob=0
       ;;
   esac
   cp "$policy" "$shipped/$agent.safetensors"

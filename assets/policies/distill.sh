@@ -79,24 +79,24 @@ for policy in "${wanted[@]}"; do
       }
       # who goes falls most easily, and so is shown twice
       learn "$steer" "$steer" "$jump" --steps 10M --seed 1 --out "$runs/start.safetensors"
-      "$marathon" train MarathonManController --option mortal=0.7 --option knocked=0 --steps 47M \
+      "$marathon" train MarathonManController --option end_on_fall_prob=0.7 --option start_pushed_prob=0 --steps 47M \
         --initialize-from "$runs/start.safetensors" --seed 1 --threads 1 --out "$runs/goes"
       # what he forgot meanwhile; the network of the run, as one that goes and jumps only
       "$marathon" import "$runs/goes" --option clip=walk,walk_left,walk_right,run,stand,jump --out "$runs/goes.safetensors"
       goes="--teacher=$runs/goes.safetensors"
       learn "$goes" "$goes" "$goes" "${skills[0]}" --steps 8M --lr 5e-4 --seed 2 --initialize-from "$runs/goes" \
         --out "$runs/knows.safetensors"
-      "$marathon" train MarathonManController --option knocked=0 --steps 20M --initialize-from "$runs/knows.safetensors" --seed 1 \
+      "$marathon" train MarathonManController --option start_pushed_prob=0 --steps 20M --initialize-from "$runs/knows.safetensors" --seed 1 \
         --threads 1 --out "$runs/run"
       # and on: to stand still, to jump higher, to get up
-      "$marathon" train MarathonManController --option knocked=0 --steps 36M --initialize-from "$runs/run" --seed 2 --threads 1 \
+      "$marathon" train MarathonManController --option start_pushed_prob=0 --steps 36M --initialize-from "$runs/run" --seed 2 --threads 1 \
         --out "$runs/still"
-      "$marathon" train MarathonManController --option mortal=0.3 --option knocked=0 --steps 40M --initialize-from "$runs/still" \
+      "$marathon" train MarathonManController --option end_on_fall_prob=0.3 --option start_pushed_prob=0 --steps 40M --initialize-from "$runs/still" \
         --seed 3 --threads 1 --out "$runs/rises"
       # falls as pushes cause them, then starts from a stand
-      "$marathon" train MarathonManController --option mortal=0.3 --option knocked=0.2 --steps 40M --initialize-from "$runs/rises" \
+      "$marathon" train MarathonManController --option end_on_fall_prob=0.3 --option start_pushed_prob=0.2 --steps 40M --initialize-from "$runs/rises" \
         --seed 4 --threads 1 --out "$runs/knocked"
-      "$marathon" train MarathonManController --option start=first --option mortal=0.5 --option knocked=0.1 --steps 18M \
+      "$marathon" train MarathonManController --option start=first --option end_on_fall_prob=0.5 --option start_pushed_prob=0.1 --steps 18M \
         --initialize-from "$runs/knocked" --seed 7 --threads 1 --out "$runs/stands"
       # all of it, for long; two runs of 130 million that were stopped after 30 and 40, and one that was not
       "$marathon" train MarathonManController --steps 70M --initialize-from "$runs/stands" --seed 1 --threads 1 --out "$runs/all"
@@ -114,19 +114,19 @@ for policy in "${wanted[@]}"; do
       }
       # who plays starts from a stand, and is not asked for extremes half of the time
       mean() {
-        "$marathon" average "${@:2}" --option start=first --option commands=even --option mortal=0 --option knocked=0 \
-          --option price=20 --option relive=0 --out "$1"
+        "$marathon" average "${@:2}" --option start=first --option commands=even --option end_on_fall_prob=0 --option start_pushed_prob=0 \
+          --option fall_penalty=20 --option replay_falls_prob=0 --out "$1"
       }
       first=("$runs"/steady/policies/policy-50*.safetensors)
       noisy --initialize-from "${first[0]}" --seed 1 --out "$runs/n1"
       noisy --option commands=even --initialize-from "$runs/n1" --seed 2 --out "$runs/n2"
       several=("${first[0]}" "$runs/n1/policy.safetensors" "$runs/n2/policy.safetensors")
       mean "$runs/three.safetensors" "${several[@]}"
-      noisy --option relive=0.3 --initialize-from "$runs/three.safetensors" --seed 3 --out "$runs/n3"
+      noisy --option replay_falls_prob=0.3 --initialize-from "$runs/three.safetensors" --seed 3 --out "$runs/n3"
       several+=("$runs/n3/policy.safetensors")
       mean "$runs/four.safetensors" "${several[@]}"
       # to get up in time
-      noisy --option mortal=0.4 --option knocked=0.25 --steps 40M --initialize-from "$runs/four.safetensors" --seed 5 --out "$runs/n4"
+      noisy --option end_on_fall_prob=0.4 --option start_pushed_prob=0.25 --steps 40M --initialize-from "$runs/four.safetensors" --seed 5 --out "$runs/n4"
       mean "$shipped/MarathonManController.safetensors" "$runs/n4/policy.safetensors" "$runs/four.safetensors"
       ;;
     *)

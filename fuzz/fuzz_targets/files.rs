@@ -9,7 +9,7 @@ use marathon_learn::{Checkpoint, Policy};
 use marathon_mlagents::read_demonstrations;
 use marathon_runs::report::csv::{CsvLog, History};
 use marathon_runs::report::tensorboard::EventLog;
-use marathon_runs::{RunFolder, RunOptions, Session, Setting};
+use marathon_runs::{RunFolder, RunOptions, Session, TaskConfig};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -44,7 +44,7 @@ fn read(kind: u8, bytes: &[u8]) {
             Err(error) => names_it(error.to_string()),
         },
         3 => {
-            let spec = Setting::named("hopper").unwrap().factory().unwrap().spec().clone();
+            let spec = TaskConfig::named("hopper").unwrap().factory().unwrap().spec().clone();
             if let Err(error) = read_demonstrations(path, bytes, &spec) {
                 names_it(error.to_string());
             }
@@ -89,7 +89,7 @@ fn read(kind: u8, bytes: &[u8]) {
 fn used(policy: &Policy) {
     let action = policy.act(&vec![0.5; policy.meta().obs]);
     assert_eq!(action.len(), policy.meta().act);
-    let _ = Setting::of(policy.meta()).factory();
+    let _ = TaskConfig::of_policy(policy.meta()).factory();
 }
 
 /// A folder for this process.
@@ -113,7 +113,7 @@ fn run() -> PathBuf {
     static RUN: OnceLock<PathBuf> = OnceLock::new();
     RUN.get_or_init(|| {
         let run = folder().join("run");
-        let task = Setting::named("hopper").unwrap();
+        let task = TaskConfig::named("hopper").unwrap();
         let file = marathon_runs::RunFile::new(&task, &marathon_config::default_for("hopper"));
         let made = RunFolder::create(Some(&run), "hopper").unwrap();
         made.begin(&file).unwrap();

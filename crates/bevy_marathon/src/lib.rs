@@ -82,7 +82,7 @@ pub mod prelude {
         AgentCommand, CommandError, Ground, Marathon, PolicyAsset, RagdollError, RagdollPrefab, RagdollState,
     };
     pub use marathon_physics::Variation;
-    pub use marathon_runs::Setting;
+    pub use marathon_runs::TaskConfig;
 }
 
 /// The programs of the README are compiled as tests.

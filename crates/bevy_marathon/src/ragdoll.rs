@@ -7,7 +7,7 @@ use bevy::prelude::*;
 use bevy::reflect::reflect_remote;
 use marathon_envs::Spec;
 use marathon_physics::{Model, Variation};
-use marathon_runs::Setting;
+use marathon_runs::TaskConfig;
 use std::sync::Arc;
 
 /// A physical character. Its [`Transform`] is where its track begins and which way it runs (along its own +x); the
@@ -30,7 +30,7 @@ pub struct Ragdoll {
     /// An agent's task with its arguments and clips. `None`: what its [`CharacterPolicy`] notes when the ragdoll enters the simulation,
     /// which waits for a policy that is still being loaded; without a policy, the defaults. Scenes do not keep it.
     #[reflect(ignore)]
-    pub setting: Option<Setting>,
+    pub task_config: Option<TaskConfig>,
 }
 
 /// Kind of a [`Ragdoll`].
@@ -45,7 +45,7 @@ pub enum Character {
 
 impl Ragdoll {
     fn new(character: Character) -> Self {
-        Ragdoll { character, seed: 0, number: 0, ground: Ground::Level, setting: None }
+        Ragdoll { character, seed: 0, number: 0, ground: Ground::Level, task_config: None }
     }
 
     /// An agent of the registry; to add one's own, see [`marathon_envs::register`].
@@ -65,8 +65,8 @@ impl Ragdoll {
     }
 
     /// The same with a task of these arguments, whatever its policy notes.
-    pub fn with_setting(mut self, setting: Setting) -> Self {
-        self.setting = Some(setting);
+    pub fn with_task_config(mut self, task_config: TaskConfig) -> Self {
+        self.task_config = Some(task_config);
         self
     }
 

@@ -18,7 +18,7 @@ use bevy::prelude::*;
 use bevy::tasks::ComputeTaskPool;
 use marathon_learn::PolicyMeta;
 use marathon_render::Scene;
-use marathon_runs::{RunError, Setting};
+use marathon_runs::{RunError, TaskConfig};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -40,7 +40,7 @@ pub(crate) fn admit(
     for (entity, ragdoll, restart, policy, command) in &new {
         let meta = policy.and_then(|policy| policies.get(&policy.0)).map(|asset| asset.0.meta());
         let loads = |policy: &CharacterPolicy| matches!(server.load_state(&policy.0), LoadState::Loading);
-        if ragdoll.setting.is_none() && meta.is_none() && policy.is_some_and(loads) {
+        if ragdoll.task_config.is_none() && meta.is_none() && policy.is_some_and(loads) {
             continue;
         }
         match enter(&mut marathon, &prefabs, ragdoll, meta, *restart) {
@@ -67,13 +67,14 @@ fn enter(
         Character::Agent(_) => ragdoll.ground,
         Character::Prefab(_) => Ground::Level,
     };
-    let setting = setting(ragdoll, policy)?;
-    let same = |h: &CharacterKind| h.character == ragdoll.character && h.ground == ground && h.setting == setting;
+    let task_config = task_config(ragdoll, policy)?;
+    let same =
+        |h: &CharacterKind| h.character == ragdoll.character && h.ground == ground && h.task_config == task_config;
     let number = match marathon.kinds.iter().position(same) {
         Some(number) => number,
         None => {
             let kind = match &ragdoll.character {
-                Character::Agent(name) => CharacterKind::of_agent(name, &setting, ground, now)?,
+                Character::Agent(name) => CharacterKind::of_agent(name, &task_config, ground, now)?,
                 Character::Prefab(handle) => match prefabs.get(handle) {
                     Some(prefab) => CharacterKind::of_prefab(handle, prefab.model.clone(), now),
                     None => return Ok(None),
@@ -94,14 +95,14 @@ fn enter(
 }
 
 /// The task of a ragdoll: its own, or else that of its policy, or else that of its agent's defaults.
-fn setting(ragdoll: &Ragdoll, policy: Option<&PolicyMeta>) -> Result<Setting, RunError> {
-    let Character::Agent(name) = &ragdoll.character else { return Ok(Setting::default()) };
-    if let Some(setting) = &ragdoll.setting {
-        return Ok(setting.clone());
+fn task_config(ragdoll: &Ragdoll, policy: Option<&PolicyMeta>) -> Result<TaskConfig, RunError> {
+    let Character::Agent(name) = &ragdoll.character else { return Ok(TaskConfig::default()) };
+    if let Some(task_config) = &ragdoll.task_config {
+        return Ok(task_config.clone());
     }
-    let named = Setting::named(name)?;
+    let named = TaskConfig::named(name)?;
     // a policy for another agent is refused later
-    Ok(policy.map(Setting::of).filter(|noted| noted.agent == named.agent).unwrap_or(named))
+    Ok(policy.map(TaskConfig::of_policy).filter(|noted| noted.agent == named.agent).unwrap_or(named))
 }
 
 /// Makes the entities of a ragdoll's bodies, and its command if its agent takes one.

@@ -39,8 +39,8 @@ fn play(agent: &str, policy: Net, frame: Duration, order: impl Fn(usize) -> usiz
     ragdolls.iter().filter_map(|r| first(app.world(), *r)).map(|e| e.episode).collect()
 }
 
-fn measure(setting: &Setting, policy: &Net) -> Evaluation {
-    let factory = setting.factory().expect("the task exists");
+fn measure(task_config: &TaskConfig, policy: &Net) -> Evaluation {
+    let factory = task_config.factory().expect("the task exists");
     let options = EvalOptions { episodes: EPISODES, seed: SEED, threads: 1 };
     evaluate(&*factory, Isa::best(), policy, &options).expect("the policy fits")
 }
@@ -57,8 +57,8 @@ fn compare(agent: &str, eval: &Evaluation, episodes: &[Episode]) {
 
 /// A policy that comes with its agent.
 fn shipped(agent: &str, frame: Duration, order: impl Fn(usize) -> usize) {
-    let setting = Setting::named(agent).expect("the agent exists");
-    compare(agent, &measure(&setting, &policy(agent)), &play(agent, policy(agent), frame, order));
+    let task_config = TaskConfig::named(agent).expect("the agent exists");
+    compare(agent, &measure(&task_config, &policy(agent)), &play(agent, policy(agent), frame, order));
 }
 
 #[test]
@@ -86,15 +86,15 @@ fn in_the_task_that_the_policy_notes() {
         .map(|(name, value): (&str, &str)| {
             (name.to_string(), value.parse::<Value>().unwrap_or_else(|never| match never {}))
         });
-    let plain = Setting::named("MarathonMan").expect("the agent exists");
-    let setting = plain.clone().with(&TaskOptions { given: given.into() }).expect("arguments that it takes");
-    let policy = hardly_trained(&setting);
-    assert_eq!(policy.meta().options.get("clip"), setting.options.get("clip"));
-    let eval = measure(&setting, &policy);
+    let plain = TaskConfig::named("MarathonMan").expect("the agent exists");
+    let task_config = plain.clone().with(&TaskOptions { given: given.into() }).expect("arguments that it takes");
+    let policy = hardly_trained(&task_config);
+    assert_eq!(policy.meta().options.get("clip"), task_config.options.get("clip"));
+    let eval = measure(&task_config, &policy);
     compare("MarathonMan", &eval, &play("MarathonMan", policy.clone(), Duration::from_millis(40), |i| i));
     // the file is not needed, and explicit options take precedence over those that the policy notes
     drop(folder);
-    let other = setting.overlaid(&Setting { options: Options::new().with("start", "random"), ..plain });
+    let other = task_config.overlay(&TaskConfig { options: Options::new().with("start", "random"), ..plain });
     assert_ne!(measure(&other, &policy).length_mean, eval.length_mean);
 }
 
@@ -103,9 +103,9 @@ fn in_the_task_that_the_policy_notes() {
 fn a_role_that_does_not_decide_goes_on() {
     let given = [("commander", "adversary"), ("input", "continuous")];
     let given = given.map(|(name, value)| (name.to_string(), Value::Text(value.into())));
-    let plain = Setting::named("WalkerController").expect("the agent exists");
-    let setting = plain.with(&TaskOptions { given: given.into() }).expect("arguments that it takes");
-    let (runner, others) = roles_hardly_trained(&setting);
+    let plain = TaskConfig::named("WalkerController").expect("the agent exists");
+    let task_config = plain.with(&TaskOptions { given: given.into() }).expect("arguments that it takes");
+    let (runner, others) = roles_hardly_trained(&task_config);
     let (name, commander) = others.into_iter().next().expect("two roles");
     assert_eq!(name, "commander");
     let mut app = app(Duration::from_millis(8));
@@ -125,13 +125,13 @@ fn a_role_that_does_not_decide_goes_on() {
 }
 
 /// A policy of some steps of training.
-fn hardly_trained(setting: &Setting) -> Net {
-    roles_hardly_trained(setting).0
+fn hardly_trained(task_config: &TaskConfig) -> Net {
+    roles_hardly_trained(task_config).0
 }
 
 /// The first role's, and the others' with their names.
-fn roles_hardly_trained(setting: &Setting) -> (Net, Vec<(String, Net)>) {
-    let factory = setting.factory().expect("the task exists");
+fn roles_hardly_trained(task_config: &TaskConfig) -> (Net, Vec<(String, Net)>) {
+    let factory = task_config.factory().expect("the task exists");
     let config = TrainConfig::default().with(|config| {
         (config.run.agents, config.run.horizon, config.run.total_steps) = (16, 8, 256);
         config.network.hidden = vec![8];

@@ -13,7 +13,7 @@ const EXAMPLES: &str = "\
 Examples:
   marathon train hopper                         learn to hop; results go to runs/hopper-1
   marathon train MarathonMan --option clip=my.bvh   learn to move as in a recording
-  marathon train hopper --set ppo.lr=3e-4       the same with another setting; `marathon config show hopper` has all
+  marathon train hopper --set ppo.lr=3e-4       the same with another task_config; `marathon config show hopper` has all
   marathon train hopper --algo acktr            the same by another algorithm: ppo, a2c, acktr
   marathon render runs/hopper-1 --out hop.gif   see it
   marathon eval runs/hopper-1 --episodes 1000   measure it
@@ -120,7 +120,7 @@ pub struct ShowArgs {
     /// Algorithm, with the settings that it starts from in place of the task's preset.
     #[arg(long, value_name = "NAME", value_parser = Algorithm::NAMES)]
     pub algo: Option<String>,
-    /// Setting that differs, such as `ppo.lr=3e-4`; may be repeated.
+    /// TaskConfig that differs, such as `ppo.lr=3e-4`; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
 }

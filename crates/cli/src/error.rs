@@ -39,6 +39,9 @@ pub enum CliError {
     /// The game cannot be started, or failed.
     #[error("{0}")]
     Game(String),
+    /// The processor lacks an instruction that this program was built for.
+    #[error("{0}")]
+    Processor(&'static str),
     /// The command line is wrong.
     #[error("{0}")]
     Usage(String),

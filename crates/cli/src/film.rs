@@ -10,7 +10,7 @@ use marathon_physics::model::JointType;
 use marathon_render::{Corner, Follow, Format, Frame, GhostPlace, Recorder, Renderer, Scene, status_line, strip_size};
 use marathon_runs::terminal::interrupt;
 use marathon_runs::text::unsigned_zero;
-use marathon_runs::{Play, Setting, text};
+use marathon_runs::{Play, TaskConfig, text};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -225,7 +225,11 @@ impl<'a> Stage<'a> {
             ..Default::default()
         };
         let model = registry::agent(&spec.id)?.model()?;
-        let play = Play::of(&Setting::asked(policies[0].meta()), &policies.iter().collect::<Vec<_>>(), &options)?;
+        let play = Play::of(
+            &TaskConfig::with_training_options(policies[0].meta()),
+            &policies.iter().collect::<Vec<_>>(),
+            &options,
+        )?;
         if cast.ghost.is_some() && play.reference(0)?.is_none() {
             let text =
                 format!("--ghost: {} follows no clip, expected an agent that does, such as MarathonMan", spec.id);

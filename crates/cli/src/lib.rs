@@ -18,6 +18,7 @@ use args::{Args, Command};
 use clap::Parser;
 use clap::error::{ContextKind, ContextValue};
 use error::CliError;
+use marathon_physics::lanes::Isa;
 use marathon_runs::terminal;
 use std::ffi::OsString;
 
@@ -55,6 +56,9 @@ fn with_advice(mut answer: clap::Error) -> clap::Error {
 }
 
 fn dispatch(args: &Args) -> Result<(), CliError> {
+    if let Some(obstacle) = Isa::best().obstacle() {
+        return Err(CliError::Processor(obstacle));
+    }
     match &args.command {
         Command::Train(train) => commands::train::run(train, args.json),
         Command::Distill(distill) => commands::distill::run(distill, args.json),

@@ -6,13 +6,13 @@ mod common;
 use common::*;
 use marathon_envs::options::{Options, Value};
 use marathon_learn::{Policy, PolicyMeta};
-use marathon_runs::Setting;
+use marathon_runs::TaskConfig;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// A policy for a task with options that the task may refuse.
 fn policy(folder: &Path, agent: &str, options: &[(&str, Value)], change: impl Fn(&mut PolicyMeta)) {
-    let spec = Setting::named(agent).unwrap().factory().unwrap().spec().clone();
+    let spec = TaskConfig::named(agent).unwrap().factory().unwrap().spec().clone();
     let mut meta = PolicyMeta::of(&spec, vec![4], marathon_learn::Activation::Tanh);
     let all = options.iter().fold(Options::new(), |all, (name, value)| all.with(name, value.clone()));
     meta.options = all;
@@ -53,8 +53,8 @@ fn arguments_beyond_measure_are_refused_by_name() {
         assert!(text.contains(part), "{agent} {name}: {text}");
     }
     // training options, which playing does not need
-    let text = fail(path, 1, &["train", "MarathonManSteer", "--option", "relive=1e18"]);
-    assert!(text.contains("option relive") && text.contains("a number from 0 to 1"), "{text}");
+    let text = fail(path, 1, &["train", "MarathonManSteer", "--option", "replay_falls_prob=1e18"]);
+    assert!(text.contains("option replay_falls_prob") && text.contains("a number from 0 to 1"), "{text}");
     let names = vec!["walk"; 100_000].join(",");
     policy(path, "MarathonMan", &[("clip", names.as_str().into())], |_| {});
     let text = refusal(path);

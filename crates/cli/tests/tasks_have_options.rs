@@ -67,7 +67,7 @@ fn what_only_helps_to_learn_plays_along_if_it_is_asked_for() {
     let film = ["render", "--out", "a.png", "--frames", "2", "--seconds", "0.5", "--width", "40"];
     let demo = ["record-demo", "--out", "a.demo", "--episodes", "1"];
     for (words, number) in [(&film[..], "distance_mean"), (&demo, "return_mean")] {
-        assert_ne!(told(words, "knocked=1", number), told(words, "knocked=0", number), "{words:?}");
+        assert_ne!(told(words, "start_pushed_prob=1", number), told(words, "start_pushed_prob=0", number), "{words:?}");
     }
 }
 
@@ -170,7 +170,7 @@ fn wrong_options_are_refused_by_name_with_the_nearest() {
     };
     refused("clp=run", 1, &["clp", "'clip'", "future"]);
     refused("start=frist", 1, &["start", "'frist'", "random, first or adaptive"]);
-    refused("reach=-1", 1, &["reach", "-1", "0 or more"]);
+    refused("action_scale=-1", 1, &["action_scale", "-1", "0 or more"]);
     refused("clip=runn", 1, &["clip is 'runn'", "did you mean 'run'?", "backflip"]);
     refused("clip", 2, &["--option", "NAME=VALUE"]);
     refused("clip=mime.motion", 1, &["mime.motion", "no such file", "did you mean 'mine.motion'?", "backflip"]);

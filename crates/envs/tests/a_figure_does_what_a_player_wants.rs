@@ -340,7 +340,7 @@ fn felled(list: &[(&str, &str)]) -> Vec<(bool, bool)> {
 fn a_fall_leads_to_getting_up_or_ends_the_episode() {
     let all = felled(&[("start", "first")]);
     assert!(all.iter().all(|(ended, rises)| !ended && *rises), "{all:?}");
-    for list in [[("start", "first"), ("clip", "walk,stand,jump")], [("start", "first"), ("mortal", "1")]] {
+    for list in [[("start", "first"), ("clip", "walk,stand,jump")], [("start", "first"), ("end_on_fall_prob", "1")]] {
         let all = felled(&list);
         assert!(all.iter().all(|(ended, _)| *ended), "{list:?}: {all:?}");
     }

@@ -10,7 +10,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use common::{action, isas, make};
 use marathon_envs::agents::marathon::marathon_man::clips;
 use marathon_envs::agents::marathon::marathon_man::gait::gaits;
-use marathon_envs::agents::marathon::marathon_man::steer::{MOST_BEHIND, STYLE};
+use marathon_envs::agents::marathon::marathon_man::steer::{MAX_HEADING_LAG, STYLE};
 use marathon_envs::{AgentState, Autoreset, Demonstrations, VecEnv, VecEnvOptions, agent, factory};
 use marathon_motion::dynamics::Motion;
 use marathon_physics::Model;
@@ -206,15 +206,15 @@ fn the_commanded_direction_turns_as_told_and_rewards_are_their_formula() {
         for agent in (0..AGENTS).filter(|agent| !over[*agent]).collect::<Vec<_>>() {
             let (was, is) = (row(&before, agent, n), row(&out.obs, agent, n));
             let angle = is[2].atan2(is[3]);
-            assert!((is[2].hypot(is[3]) - 1.0).abs() < 1e-5 && angle.abs() < MOST_BEHIND + 1e-5);
+            assert!((is[2].hypot(is[3]) - 1.0).abs() < 1e-5 && angle.abs() < MAX_HEADING_LAG + 1e-5);
             behind = behind.max(angle.abs());
             // angles are compared modulo a full turn
             let (own, off) = (heading(&env.state(agent).unwrap()), |a: f64| a.sin().atan2(a.cos()));
             let velocity = center_velocity(&model, &env.state(agent).unwrap());
             // the turn rate is limited to a lateral acceleration of 3 m/s^2 at the body's speed
             let most = 3.0 / velocity[0].hypot(velocity[1]);
-            let expected =
-                (off(directions[agent] - own) + was[1].clamp(-most, most) * dt).clamp(-MOST_BEHIND, MOST_BEHIND);
+            let expected = (off(directions[agent] - own) + was[1].clamp(-most, most) * dt)
+                .clamp(-MAX_HEADING_LAG, MAX_HEADING_LAG);
             limited += usize::from(was[1].abs() > most);
             directions[agent] = own + expected;
             assert!((angle - expected).abs() < 1e-5, "agent {agent}: {angle}, expected {expected}");
@@ -330,7 +330,7 @@ fn sharp_commands_are_extremes_half_of_the_time() {
 
 #[test]
 fn episodes_may_start_standing_and_falls_may_have_a_penalty() {
-    let (mut env, obs) = begun(&[("start", "first"), ("price", "20")]);
+    let (mut env, obs) = begun(&[("start", "first"), ("fall_penalty", "20")]);
     let n = env.spec().obs;
     for row in obs.chunks_exact(n) {
         // upright and at rest, up to noise and the sway of standing

@@ -199,7 +199,7 @@ fn observations_rewards_and_terminations_agree_with_mujoco() {
         }
         let ahead = &[4, 8, 16][..future as usize];
         request.push(json!({
-            "figure": figure, "xml": facts.model.text(), "frame_skip": facts.frame_skip, "control": control, "reach": 1.0,
+            "figure": figure, "xml": facts.model.text(), "frame_skip": facts.frame_skip, "control": control, "action_scale": 1.0,
             "reward": reward, "distance": 0.5, "future": ahead, "episodes": episodes,
         }));
         ours.push((format!("{id} {clip}, {control}, {reward}"), env.spec().clone(), steps));

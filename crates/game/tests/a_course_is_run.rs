@@ -151,7 +151,7 @@ fn the_replay_of_a_run_on_a_builders_course_is_the_run_to_the_bit() -> Result<()
 
     // the recorded actions give the same run in the environment
     let options = VecEnvOptions { agents: 1, autoreset: Autoreset::Disabled, ..VecEnvOptions::default() };
-    let mut env = recording.setting.vec_env(&options)?;
+    let mut env = recording.task_config.vec_env(&options)?;
     let mut out = env.buffers();
     let [seed, number, _] = run.draw;
     env.reseed_agent(0, seed, number as usize)?;

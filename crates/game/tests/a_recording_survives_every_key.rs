@@ -35,7 +35,7 @@ fn a_recording_survives_every_key() -> Result<(), Box<dyn Error>> {
         let all = recordings(folder.path()).map_err(|error| format!("{name}: {error}"))?;
         assert!(all.iter().all(|recording| recording.frames() > 1), "{name}");
         // the first recording lasts at least from its start to the key, apart from paused or fast time
-        let first = all.iter().find(|recording| recording.setting.agent == "Hopper-v0" && recording.agents == 2);
+        let first = all.iter().find(|recording| recording.task_config.agent == "Hopper-v0" && recording.agents == 2);
         let seconds = first.ok_or_else(|| format!("{name}: it is lost"))?.seconds();
         assert!(seconds > 0.8, "{name}: {seconds} s");
     }

@@ -37,9 +37,9 @@ fn switch(app: &mut App, mode: Mode) {
 
 /// A recording of a hopper.
 fn recording(folder: &Path) -> Result<PathBuf, Box<dyn Error>> {
-    let setting = Setting::named("hopper")?;
-    let spec = setting.factory()?.spec().clone();
-    let mut recording = Recording::new(setting, Ground::Level, spec.dt, vec![0.0; 3]);
+    let task_config = TaskConfig::named("hopper")?;
+    let spec = task_config.factory()?.spec().clone();
+    let mut recording = Recording::new(task_config, Ground::Level, spec.dt, vec![0.0; 3]);
     for frame in 0..50 {
         recording.push(&Row {
             qpos: &vec![0.0; spec.nq],
@@ -58,7 +58,7 @@ fn recording(folder: &Path) -> Result<PathBuf, Box<dyn Error>> {
 
 /// A hopper that another program moves.
 fn remote_source() -> Result<RemoteSource, Box<dyn Error>> {
-    let spec = Setting::named("hopper")?.factory()?.spec().clone();
+    let spec = TaskConfig::named("hopper")?.factory()?.spec().clone();
     let (model, dt) = (Arc::new(marathon_envs::agent("hopper")?.model()?), spec.dt);
     Ok(RemoteSource::new(PuppetKind::new(model, Some(Arc::new(spec)), dt), 1))
 }

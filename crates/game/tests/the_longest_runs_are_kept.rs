@@ -3,7 +3,7 @@
 
 use bevy_marathon::Ground;
 use marathon_game::app::{Course, KEPT, ROWS, Recording, Row, Run, Table};
-use marathon_runs::Setting;
+use marathon_runs::TaskConfig;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -32,9 +32,9 @@ fn run(kind: &str, episode: u64, distance: f64) -> Run {
 
 /// A recording of one frame that can be told from others.
 fn recording(mark: f64) -> Result<Recording, Box<dyn Error>> {
-    let setting = Setting::named("hopper")?;
-    let spec = setting.factory()?.spec().clone();
-    let mut recording = Recording::new(setting, Ground::Level, spec.dt, vec![0.0; 3]);
+    let task_config = TaskConfig::named("hopper")?;
+    let spec = task_config.factory()?.spec().clone();
+    let mut recording = Recording::new(task_config, Ground::Level, spec.dt, vec![0.0; 3]);
     recording.push(&Row {
         qpos: &vec![mark; spec.nq],
         numbers: [0.0; 5],

@@ -4,7 +4,7 @@ use crate::{Error, Result};
 use marathon_envs::Value;
 use marathon_learn::{Control, EvalOptions, Evaluation, IterationStats, Policy};
 use marathon_physics::Isa;
-use marathon_runs::{Outcome, RunOptions, Session, Setting, Task};
+use marathon_runs::{Outcome, RunOptions, Session, Task, TaskConfig};
 use std::fmt::Display;
 use std::path::PathBuf;
 
@@ -130,7 +130,7 @@ impl<'a> Trainer<'a> {
 /// # Errors
 /// If the task no longer exists, or does not take the arguments that the policy notes.
 pub fn evaluate(policy: &Policy, options: &EvalOptions) -> Result<Evaluation> {
-    let factory = Setting::of(policy.meta()).factory()?;
+    let factory = TaskConfig::of_policy(policy.meta()).factory()?;
     policy.check(factory.spec())?;
     marathon_learn::evaluate(&*factory, Isa::best(), policy, options).map_err(Error::from)
 }

@@ -36,6 +36,9 @@ mod _native {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        if let Some(obstacle) = marathon_physics::lanes::Isa::best().obstacle() {
+            return Err(pyo3::exceptions::PyImportError::new_err(obstacle));
+        }
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -4,7 +4,7 @@ use crate::clip::Clip;
 use crate::error;
 use marathon_envs::options::Value;
 use marathon_envs::{Clips, EnvError, NamedClip, Options, registry};
-use marathon_runs::Setting;
+use marathon_runs::TaskConfig;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyString};
@@ -51,9 +51,9 @@ impl GivenClip {
 }
 
 /// A task with its arguments; files of clips that they name are read.
-pub fn set(task: &str, given: Option<&Bound<'_, PyDict>>) -> PyResult<Setting> {
+pub fn set(task: &str, given: Option<&Bound<'_, PyDict>>) -> PyResult<TaskConfig> {
     let options = read(task, given)?;
-    Setting::named(task).and_then(|setting| setting.with(&options.into())).map_err(error::run)
+    TaskConfig::named(task).and_then(|task_config| task_config.with(&options.into())).map_err(error::run)
 }
 
 /// Arguments of a task by name.

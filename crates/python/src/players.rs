@@ -3,7 +3,7 @@
 use crate::error;
 use marathon_learn::{Control, Deliver, Players, TrainConfig};
 use marathon_physics::lanes::Isa;
-use marathon_runs::Setting;
+use marathon_runs::TaskConfig;
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
@@ -23,7 +23,7 @@ impl Player {
         let config: TrainConfig = serde_json::from_str(config).map_err(|e| error::value(format!("config: {e}")))?;
         let task = match task.starts_with('{') {
             true => serde_json::from_str(task).map_err(|e| error::value(format!("task: {e}")))?,
-            false => Setting::named(task).map_err(error::run)?,
+            false => TaskConfig::named(task).map_err(error::run)?,
         };
         let factory = task.factory().map_err(error::run)?;
         let make = || marathon_learn::Player::new(&*factory, Isa::best(), &config, (slice, slices));
@@ -56,7 +56,7 @@ pub struct PyPlayers {
 impl PyPlayers {
     /// Tells the object the task and the configuration of the run; it says how many slices it wants. The task is its name, or
     /// JSON if it has arguments.
-    pub fn begin(py: Python<'_>, object: Py<PyAny>, task: &Setting, config: &TrainConfig) -> PyResult<Self> {
+    pub fn begin(py: Python<'_>, object: Py<PyAny>, task: &TaskConfig, config: &TrainConfig) -> PyResult<Self> {
         let task = match task.options.is_empty() {
             true => task.agent.clone(),
             false => serde_json::to_string(task).map_err(error::any)?,

@@ -6,7 +6,7 @@ use crate::{batch_task, error, number, options as arguments};
 use marathon_envs::BLOCK;
 use marathon_learn::{BlockPolicy, EvalOptions, evaluate as play};
 use marathon_physics::lanes::Isa;
-use marathon_runs::{Setting, policy_file};
+use marathon_runs::{TaskConfig, policy_file};
 use numpy::{AllowTypeChange, PyArray1, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -142,11 +142,11 @@ pub fn evaluate<'py>(
         }
         other => {
             let name = if let Some(Task::Name(name)) = other { task::plain(name) } else { policy.task() };
-            let noted = Setting::of(policy.0.meta());
-            let asked = Setting::named(name).map_err(error::run)?;
-            let setting = if asked.agent == noted.agent { noted } else { asked };
+            let noted = TaskConfig::of_policy(policy.0.meta());
+            let asked = TaskConfig::named(name).map_err(error::run)?;
+            let task_config = if asked.agent == noted.agent { noted } else { asked };
             let given = arguments::read(name, given)?.into();
-            let factory = setting.with(&given).and_then(|setting| setting.factory()).map_err(error::run)?;
+            let factory = task_config.with(&given).and_then(|task_config| task_config.factory()).map_err(error::run)?;
             py.detach(|| play(&*factory, Isa::best(), &policy.0, &options))
         }
     };

@@ -5,7 +5,7 @@ use crate::model::Model;
 use crate::{error, number, options, task};
 use marathon_envs::registry;
 use marathon_render::{Follow, Scene};
-use marathon_runs::Setting;
+use marathon_runs::TaskConfig;
 use numpy::ndarray::Ix2;
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
@@ -33,7 +33,7 @@ impl Renderer {
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let id = task::plain(id);
-        let Setting { agent, options } = options::set(id, options)?;
+        let TaskConfig { agent, options } = options::set(id, options)?;
         let agent = registry::global().agent_with(&agent, &options).map_err(error::env)?;
         Self::with(&agent.model().map_err(error::env)?, width, height, agents)
     }

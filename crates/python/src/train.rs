@@ -142,7 +142,8 @@ pub fn train(
 
     let terms = session.factory.spec().reward_terms.clone();
     let run = &session.run;
-    let mut players = players.map(|object| PyPlayers::begin(py, object, &session.setting, &run.config)).transpose()?;
+    let mut players =
+        players.map(|object| PyPlayers::begin(py, object, &session.task_config, &run.config)).transpose()?;
     let mut failure: Option<PyErr> = None;
     let mut last = (session.steps(), 0.0);
     let result = batch_task::run(py, made.batch_task.as_deref(), || {

@@ -5,7 +5,7 @@ use crate::error::RunError;
 use crate::folder::POLICIES;
 use crate::policy_file;
 use crate::report::kept_policies;
-use crate::setting::TaskOptions;
+use crate::task_config::TaskOptions;
 use marathon_learn::Policy;
 use std::path::{Path, PathBuf};
 

@@ -11,7 +11,7 @@ use crate::error::RunError;
 #[cfg(feature = "clap")]
 use crate::options::parse_steps;
 use crate::policy_file;
-use crate::setting::{CLIP, Setting};
+use crate::task_config::{CLIP, TaskConfig};
 use marathon_envs::options::OptionValue;
 use marathon_envs::{Clips, NamedClip, Step, VecEnv, VecEnvOptions, registry};
 use marathon_learn::{
@@ -157,7 +157,7 @@ struct Class {
 /// student lacks, or differs in actions or decision interval. If the task cannot be created, or the learning rate is so
 /// large that numbers become infinite.
 pub fn distill(
-    task: Setting,
+    task: TaskConfig,
     teachers: &[PathBuf],
     options: &DistillOptions,
     watch: &mut dyn FnMut(&Distilled) -> Control,
@@ -172,7 +172,7 @@ pub fn distill(
 /// # Errors
 /// Like [`distill`], and if the file cannot be written, is damaged, or belongs to another distillation.
 pub fn resumable(
-    task: Setting,
+    task: TaskConfig,
     teachers: &[PathBuf],
     options: &DistillOptions,
     notes: Option<&Path>,
@@ -250,7 +250,7 @@ struct School {
 }
 
 impl School {
-    fn open(task: Setting, paths: &[PathBuf], options: &DistillOptions) -> Result<Self, RunError> {
+    fn open(task: TaskConfig, paths: &[PathBuf], options: &DistillOptions) -> Result<Self, RunError> {
         let teachers: Vec<(&PathBuf, Policy)> =
             paths.iter().map(|path| Ok((path, policy_file::read(path, None)?))).collect::<Result<_, RunError>>()?;
         if teachers.is_empty() {
@@ -297,7 +297,7 @@ impl School {
 
 /// Everything that affects the result of a distillation, by name.
 fn about(
-    task: &Setting,
+    task: &TaskConfig,
     teachers: &[(&PathBuf, Policy)],
     known: Option<&Policy>,
     options: &DistillOptions,
@@ -356,11 +356,11 @@ impl Class {
 }
 
 /// The clips that a teacher follows, if the student's task takes clips.
-fn clips_of(task: &Setting, teacher: &Policy) -> Result<Option<Clips>, RunError> {
+fn clips_of(task: &TaskConfig, teacher: &Policy) -> Result<Option<Clips>, RunError> {
     if !registry::agent(&task.agent)?.has_option(CLIP) {
         return Ok(None);
     }
-    let of_teacher = Setting::of(teacher.meta());
+    let of_teacher = TaskConfig::of_policy(teacher.meta());
     if let Some(clips) = of_teacher.factory()?.spec().options.get(CLIP).and_then(Clips::read) {
         return Ok(Some(clips));
     }
@@ -381,7 +381,7 @@ fn together(lessons: &[Option<Clips>]) -> Option<Clips> {
 }
 
 /// The task with agents that follow these clips.
-fn follow(task: &Setting, clips: Clips) -> Setting {
+fn follow(task: &TaskConfig, clips: Clips) -> TaskConfig {
     let mut task = task.clone();
     task.options.set(CLIP, clips);
     task

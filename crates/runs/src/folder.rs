@@ -2,7 +2,7 @@
 
 use crate::clips;
 use crate::error::RunError;
-use crate::setting::Setting;
+use crate::task_config::TaskConfig;
 use crate::text;
 use marathon_config::Loaded;
 use marathon_envs::{NamedClip, Options};
@@ -72,7 +72,7 @@ pub struct RunFile {
 
 impl RunFile {
     /// Describes a new run.
-    pub fn new(task: &Setting, loaded: &Loaded) -> Self {
+    pub fn new(task: &TaskConfig, loaded: &Loaded) -> Self {
         Self {
             format: FORMAT.into(),
             version: VERSION,
@@ -373,7 +373,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// If a clip is missing, or has changed since the run began.
-    pub fn setting(&self, run: &RunFile) -> Result<Setting, RunError> {
+    pub fn task_config(&self, run: &RunFile) -> Result<TaskConfig, RunError> {
         let mut clips = Vec::new();
         for (name, sum) in &run.clips {
             let path = self.path.join(name);
@@ -389,7 +389,7 @@ impl RunFolder {
             }
             clips.push(NamedClip::parse(name, text.as_bytes())?);
         }
-        Ok(Setting { agent: run.agent.clone(), options: run.options.clone().bind_clips(&clips) })
+        Ok(TaskConfig { agent: run.agent.clone(), options: run.options.clone().bind_clips(&clips) })
     }
 
     /// Removes temporary files of a killed writer. Errors are ignored.
@@ -575,7 +575,7 @@ mod tests {
     fn a_flipped_bit_of_a_description_is_refused_or_changes_nothing() {
         let temp = tempfile::tempdir().unwrap();
         let path = temp.path().join(RUN);
-        let run = RunFile::new(&Setting::named("Hopper-v0").unwrap(), &marathon_config::default_for("Hopper-v0"));
+        let run = RunFile::new(&TaskConfig::named("Hopper-v0").unwrap(), &marathon_config::default_for("Hopper-v0"));
         write_description(&path, &run).unwrap();
         assert_eq!(RunFile::read(&path).unwrap(), run);
         let bytes = fs::read(&path).unwrap();

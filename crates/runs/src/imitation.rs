@@ -2,7 +2,7 @@
 
 use crate::error::RunError;
 use crate::play::Play;
-use crate::setting::{CLIP, FIRST, START, Setting};
+use crate::task_config::{CLIP, FIRST, START, TaskConfig};
 use marathon_envs::agents::marathon::marathon_man::clips;
 use marathon_envs::options::OptionValue;
 use marathon_envs::{Autoreset, Clips, NamedClip, VecEnvOptions, registry};
@@ -55,10 +55,10 @@ pub struct Followed {
 /// # Errors
 /// If the task cannot be created.
 pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Vec<Imitation>, RunError> {
-    let (setting, clips) = clips_of(policy)?;
+    let (task_config, clips) = clips_of(policy)?;
     let of_clip = |clip: Option<NamedClip>| {
-        let first = follow_from(FIRST, clip.as_ref(), policy, &setting, options)?;
-        let random = follow_from("random", clip.as_ref(), policy, &setting, options)?;
+        let first = follow_from(FIRST, clip.as_ref(), policy, &task_config, options)?;
+        let random = follow_from("random", clip.as_ref(), policy, &task_config, options)?;
         let clip = clip.map_or(String::new(), |clip| clip.name().into());
         Ok(Imitation { clip, episodes: options.episodes as u64, first, random })
     };
@@ -70,39 +70,39 @@ pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<Vec<Imitation>,
 /// # Errors
 /// If the task cannot be created.
 pub fn from_beginning(policy: &Policy, options: &EvalOptions) -> Result<Vec<Followed>, RunError> {
-    let (setting, clips) = clips_of(policy)?;
-    clips.iter().map(|clip| follow_from(FIRST, clip.as_ref(), policy, &setting, options)).collect()
+    let (task_config, clips) = clips_of(policy)?;
+    clips.iter().map(|clip| follow_from(FIRST, clip.as_ref(), policy, &task_config, options)).collect()
 }
 
 /// A policy's task and the clips that it follows. `None` if the task has no choice.
-fn clips_of(policy: &Policy) -> Result<(Setting, Vec<Option<NamedClip>>), RunError> {
-    let setting = Setting::of(policy.meta());
-    let Ok(agent) = registry::agent(&setting.agent) else { return Ok((setting, Vec::new())) };
+fn clips_of(policy: &Policy) -> Result<(TaskConfig, Vec<Option<NamedClip>>), RunError> {
+    let task_config = TaskConfig::of_policy(policy.meta());
+    let Ok(agent) = registry::agent(&task_config.agent) else { return Ok((task_config, Vec::new())) };
     if !agent.facts().follows_clips || !agent.has_option(START) {
-        return Ok((setting, Vec::new()));
+        return Ok((task_config, Vec::new()));
     }
-    let clips = setting.factory()?.spec().options.get(CLIP).and_then(Clips::read);
+    let clips = task_config.factory()?.spec().options.get(CLIP).and_then(Clips::read);
     let clips = clips.map_or(vec![None], |clips| clips::each(&clips).into_iter().map(Some).collect());
-    Ok((setting, clips))
+    Ok((task_config, clips))
 }
 
 fn follow_from(
     start: &str,
     clip: Option<&NamedClip>,
     policy: &Policy,
-    setting: &Setting,
+    task_config: &TaskConfig,
     options: &EvalOptions,
 ) -> Result<Followed, RunError> {
-    let mut setting = setting.clone();
-    setting.options.set(START, start);
+    let mut task_config = task_config.clone();
+    task_config.options.set(START, start);
     if let Some(clip) = clip {
-        setting.options.set(CLIP, clip.clone());
+        task_config.options.set(CLIP, clip.clone());
     }
-    follow(policy, &setting, options)
+    follow(policy, &task_config, options)
 }
 
 /// Plays one episode per agent.
-fn follow(policy: &Policy, setting: &Setting, options: &EvalOptions) -> Result<Followed, RunError> {
+fn follow(policy: &Policy, task_config: &TaskConfig, options: &EvalOptions) -> Result<Followed, RunError> {
     let vec_options = VecEnvOptions {
         agents: options.episodes,
         seed: options.seed,
@@ -110,8 +110,8 @@ fn follow(policy: &Policy, setting: &Setting, options: &EvalOptions) -> Result<F
         autoreset: Autoreset::Disabled,
         ..VecEnvOptions::default()
     };
-    let mut play = Play::of(setting, &[policy], &vec_options)?;
-    let model = registry::agent(&setting.agent)?.model()?;
+    let mut play = Play::of(task_config, &[policy], &vec_options)?;
+    let model = registry::agent(&task_config.agent)?.model()?;
     let tracking = Tracking::new(&model);
     let dt = policy.meta().control_dt;
     let mut episodes: Vec<Episode> = (0..options.episodes).map(|_| Episode::default()).collect();

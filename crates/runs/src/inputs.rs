@@ -4,7 +4,7 @@
 
 use crate::error::RunError;
 use crate::folder::{Inputs, policy_path};
-use crate::setting::Setting;
+use crate::task_config::TaskConfig;
 use crate::text::whole;
 use marathon_envs::ModelSource;
 use marathon_learn::{TrainConfig, checksum};
@@ -28,9 +28,9 @@ pub fn name_wholly(config: &mut TrainConfig) {
 ///
 /// # Errors
 /// If a file cannot be read.
-pub fn of(setting: &Setting, config: &TrainConfig) -> Result<Inputs, RunError> {
+pub fn of(task_config: &TaskConfig, config: &TrainConfig) -> Result<Inputs, RunError> {
     let mut inputs = Inputs::new();
-    if let Some(ModelSource::File(path)) = setting.model() {
+    if let Some(ModelSource::File(path)) = task_config.model() {
         inputs.extend(of_model(&path)?);
     }
     for file in demonstrations(config) {

@@ -23,9 +23,9 @@ pub mod processes;
 pub mod python;
 pub mod report;
 pub mod session;
-pub mod setting;
 pub mod speed;
 pub mod task;
+pub mod task_config;
 #[cfg(feature = "terminal")]
 pub mod terminal;
 pub mod text;
@@ -39,5 +39,5 @@ pub use play::Play;
 pub use report::Watch;
 pub use report::summary::Summary;
 pub use session::{Outcome, Session};
-pub use setting::{Setting, TaskOptions};
 pub use task::Task;
+pub use task_config::{TaskConfig, TaskOptions};

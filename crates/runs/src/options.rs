@@ -3,7 +3,7 @@
 
 use crate::error::RunError;
 use crate::policy_file;
-use crate::setting::TaskOptions;
+use crate::task_config::TaskOptions;
 use marathon_envs::ShardFactory;
 use marathon_learn::{Algorithm, Policy};
 use marathon_physics::budget::FILM_SECONDS;
@@ -20,7 +20,7 @@ pub struct LearnOptions {
     /// Algorithm, with the settings that it starts from in place of the task's preset.
     #[cfg_attr(feature = "clap", arg(long, value_name = "NAME", value_parser = Algorithm::NAMES))]
     pub algo: Option<String>,
-    /// Setting that differs from the configuration, such as `ppo.lr=3e-4`; may be repeated. `marathon config show TASK` lists them.
+    /// TaskConfig that differs from the configuration, such as `ppo.lr=3e-4`; may be repeated. `marathon config show TASK` lists them.
     #[cfg_attr(feature = "clap", arg(long, value_name = "KEY=VALUE"))]
     pub set: Vec<String>,
     /// Agent-steps of the whole run; short for `--set run.total_steps=N`.

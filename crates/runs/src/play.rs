@@ -1,7 +1,7 @@
 //! Playing a policy: agents side by side, controlled by its best actions.
 
 use crate::error::RunError;
-use crate::setting::Setting;
+use crate::task_config::TaskConfig;
 use marathon_envs::{AgentState, Role, Spec, Step, VecEnv, VecEnvOptions};
 use marathon_learn::{BlockPolicy, Error, Policy};
 use marathon_physics::lanes::Isa;
@@ -32,15 +32,15 @@ impl<'a> Play<'a> {
     /// # Errors
     /// If the policy's task does not exist, or the options are invalid.
     pub fn new(policy: &'a Policy, options: &VecEnvOptions) -> Result<Self, RunError> {
-        Self::of(&Setting::of(policy.meta()), &[policy], options)
+        Self::of(&TaskConfig::of_policy(policy.meta()), &[policy], options)
     }
 
     /// Creates agents in a task with other options. `policies` has one policy per role of the task, in their order.
     ///
     /// # Errors
     /// Like [`Play::new`], and if the number of policies differs from that of the roles.
-    pub fn of(setting: &Setting, policies: &[&'a Policy], options: &VecEnvOptions) -> Result<Self, RunError> {
-        let mut env = setting.vec_env(options)?;
+    pub fn of(task_config: &TaskConfig, policies: &[&'a Policy], options: &VecEnvOptions) -> Result<Self, RunError> {
+        let mut env = task_config.vec_env(options)?;
         let mut step = env.buffers();
         env.reset(None, &mut step.obs)?;
         let (roles, n) = (env.spec().deciders(), options.agents);

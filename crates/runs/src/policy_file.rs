@@ -2,7 +2,7 @@
 
 use crate::error::RunError;
 use crate::folder::{policy_of_role, policy_path};
-use crate::setting::{Setting, TaskOptions};
+use crate::task_config::{TaskConfig, TaskOptions};
 use crate::text;
 use marathon_envs::{ShardFactory, Spec};
 use marathon_learn::{Error, Policy, PolicyMeta, write_atomic};
@@ -40,8 +40,8 @@ fn load_with(
     options: &TaskOptions,
     load: Load,
 ) -> Result<(Policy, Arc<dyn ShardFactory>), RunError> {
-    let setting = setting(given, agent, options, load)?;
-    let factory = setting.factory()?;
+    let task_config = task_config(given, agent, options, load)?;
+    let factory = task_config.factory()?;
     let mut policy = read_with(given, Some(factory.spec()), load)?;
     policy.set_options(factory.spec().options.clone());
     Ok((policy, factory))
@@ -57,8 +57,8 @@ pub fn load_all(
     agent: Option<&str>,
     options: &TaskOptions,
 ) -> Result<(Vec<Policy>, Arc<dyn ShardFactory>), RunError> {
-    let setting = setting(given, agent, options, Policy::load)?;
-    let factory = setting.factory()?;
+    let task_config = task_config(given, agent, options, Policy::load)?;
+    let factory = task_config.factory()?;
     let (path, spec) = (policy_path(given)?, factory.spec());
     let mut policies = Vec::new();
     for role in spec.deciders() {
@@ -75,31 +75,31 @@ pub fn load_all(
 }
 
 /// The task for a policy.
-fn setting(given: &Path, agent: Option<&str>, options: &TaskOptions, load: Load) -> Result<Setting, RunError> {
+fn task_config(given: &Path, agent: Option<&str>, options: &TaskOptions, load: Load) -> Result<TaskConfig, RunError> {
     let noted = task_with(given, load)?;
-    let setting = match (agent.map(Setting::named).transpose()?, noted) {
+    let task_config = match (agent.map(TaskConfig::named).transpose()?, noted) {
         (Some(asked), Some(noted)) if noted.agent == asked.agent => noted,
         (Some(asked), _) => asked,
         (None, Some(noted)) => noted,
         // the message says what is missing
-        (None, None) => Setting::named(&read_with(given, None, load)?.meta().agent)?,
+        (None, None) => TaskConfig::named(&read_with(given, None, load)?.meta().agent)?,
     };
-    setting.with(options)
+    task_config.with(options)
 }
 
 /// The task that a file notes for its policy. `None` for files by other programs.
 ///
 /// # Errors
 /// If there is no such file, or it is not a policy.
-pub fn task_of(given: &Path) -> Result<Option<Setting>, RunError> {
+pub fn task_of(given: &Path) -> Result<Option<TaskConfig>, RunError> {
     task_with(given, Policy::load)
 }
 
-fn task_with(given: &Path, load: Load) -> Result<Option<Setting>, RunError> {
+fn task_with(given: &Path, load: Load) -> Result<Option<TaskConfig>, RunError> {
     let path = policy_path(given)?;
     let noted: Option<PolicyMeta> =
         if is_onnx(&path) { Policy::meta_of_onnx(&bytes(&path)?) } else { Some(load(&path)?.meta().clone()) };
-    Ok(noted.map(|meta| Setting::of(&meta)))
+    Ok(noted.map(|meta| TaskConfig::of_policy(&meta)))
 }
 
 /// Reads a policy for a task, or, without one, for the task that the file names, which may be unknown.
@@ -132,7 +132,7 @@ fn bytes(path: &Path) -> Result<Vec<u8>, RunError> {
 /// # Errors
 /// If the task lacks a part, or has other actions or another decision interval.
 pub fn seen_by(policy: &Policy, path: &Path, task: &Spec) -> Result<Vec<usize>, RunError> {
-    let whole = Setting::of(policy.meta()).factory()?.spec().clone();
+    let whole = TaskConfig::of_policy(policy.meta()).factory()?.spec().clone();
     // the policy may be that of a role
     let roles = whole.deciders().into_iter().map(|role| whole.of_role(&role));
     let own = roles.into_iter().find(|spec| spec.id == policy.meta().agent).unwrap_or(whole);

@@ -7,7 +7,7 @@
 //! resumed.
 
 use crate::error::RunError;
-use crate::setting::Setting;
+use crate::task_config::TaskConfig;
 use marathon_learn::{Algorithm, Control, Deliver, Player, Players, TrainConfig};
 use marathon_physics::lanes::Isa;
 use serde::{Deserialize, Serialize};
@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 /// Setup of a worker process.
 #[derive(Serialize, Deserialize)]
 struct Part {
-    task: Setting,
+    task: TaskConfig,
     config: TrainConfig,
     slice: usize,
     slices: usize,
@@ -69,7 +69,7 @@ impl Processes {
     ///
     /// # Errors
     /// If one cannot be started.
-    pub fn start(program: &Path, task: &Setting, config: &TrainConfig, count: usize) -> Result<Self, RunError> {
+    pub fn start(program: &Path, task: &TaskConfig, config: &TrainConfig, count: usize) -> Result<Self, RunError> {
         Self::check(config, count)?;
         let slices = count.clamp(1, config.run.blocks());
         let failed = |e: &dyn std::fmt::Display| RunError::Process(format!("a process cannot be started: {e}"));

@@ -12,8 +12,8 @@ use crate::processes::Processes;
 use crate::report::csv::History;
 use crate::report::summary::{EPISODES, Summary};
 use crate::report::{Reporter, Watch, curve, save, save_policies};
-use crate::setting::{Setting, TaskOptions};
 use crate::task::Task;
+use crate::task_config::{TaskConfig, TaskOptions};
 use crate::text::{thousands, whole};
 use marathon_config::Loaded;
 use marathon_envs::ShardFactory;
@@ -35,7 +35,7 @@ pub struct Session {
     /// Its task.
     pub factory: Arc<dyn ShardFactory>,
     /// Recreates the task, if it is registered.
-    pub setting: Setting,
+    pub task_config: TaskConfig,
     /// The checkpoint that it resumes from.
     pub checkpoint: Option<Checkpoint>,
 }
@@ -117,14 +117,14 @@ impl Session {
         Processes::check(&loaded.config, options.processes)?;
         // the user's options come later and have precedence
         let given = loaded.options.iter().chain(&options.task.given).cloned().collect();
-        let (factory, setting) = task.with(&TaskOptions { given })?.factory(loaded.config.run.agents)?;
+        let (factory, task_config) = task.with(&TaskOptions { given })?.factory(loaded.config.run.agents)?;
         loaded.config.check_roles(factory.spec())?;
         inputs::name_wholly(&mut loaded.config);
         let factory = with_demonstrations(factory, &loaded.config)?;
         loaded.summary_freq = loaded.summary_freq.max(1);
         loaded.checkpoint_interval = loaded.checkpoint_interval.max(1);
-        let mut run = RunFile::new(&setting, &loaded);
-        run.files = inputs::of(&setting, &run.config)?;
+        let mut run = RunFile::new(&task_config, &loaded);
+        run.files = inputs::of(&task_config, &run.config)?;
         run.initialize_from = options.initialize_from.as_deref().map(whole);
         run.initialize_from_checksum = run.initialize_from.as_deref().map(inputs::of_start).transpose()?;
         let checkpoint = start_from(&run, &*factory)?;
@@ -137,7 +137,7 @@ impl Session {
             }
             folder = Some(made);
         }
-        Ok((Session { run, folder, factory, setting, checkpoint }, loaded.notes))
+        Ok((Session { run, folder, factory, task_config, checkpoint }, loaded.notes))
     }
 
     fn resume(task: Option<Task<'_>>, options: &RunOptions, path: &Path) -> Result<Self, RunError> {
@@ -148,7 +148,7 @@ impl Session {
                 return Err(RunError::file(path, "agent", &run.agent, task.id()));
             }
             Some(task) if task.is_made() => task,
-            _ => Task::set(folder.setting(&run)?),
+            _ => Task::set(folder.task_config(&run)?),
         };
         inputs::check(&run.files)?;
         Processes::check(&run.config, options.processes)?;
@@ -171,11 +171,11 @@ impl Session {
             return Err(RunError::Complete { folder: path.into(), steps: done });
         }
         run.config.run.threads = learn.threads.unwrap_or(run.config.run.threads);
-        let (factory, setting) = task.factory(run.config.run.agents)?;
+        let (factory, task_config) = task.factory(run.config.run.agents)?;
         let factory = with_demonstrations(factory, &run.config)?;
         folder.write_run(&run)?;
         let checkpoint = checkpoint.map_or_else(|| start_from(&run, &*factory), |last| Ok(Some(last)))?;
-        Ok(Session { folder: Some(folder), run, factory, setting, checkpoint })
+        Ok(Session { folder: Some(folder), run, factory, task_config, checkpoint })
     }
 
     /// Number of agent-steps done before.

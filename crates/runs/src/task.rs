@@ -1,7 +1,7 @@
 //! The task of a run: registered, or created by a front end.
 
 use crate::error::RunError;
-use crate::setting::{Setting, TaskOptions};
+use crate::task_config::{TaskConfig, TaskOptions};
 use marathon_envs::ShardFactory;
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ type Make<'a> = Box<dyn FnOnce(usize) -> Result<Arc<dyn ShardFactory>, RunError>
 
 /// A task whose environments do not exist yet.
 pub struct Task<'a> {
-    setting: Setting,
+    task_config: TaskConfig,
     /// Factory of a task that a front end creates.
     make: Option<Make<'a>>,
 }
@@ -20,17 +20,17 @@ impl<'a> Task<'a> {
     /// # Errors
     /// If the task does not exist. The text names the nearest.
     pub fn named(name: &str) -> Result<Self, RunError> {
-        Ok(Self::set(Setting::named(name)?))
+        Ok(Self::set(TaskConfig::named(name)?))
     }
 
     /// A registered task with its options.
-    pub fn set(setting: Setting) -> Self {
-        Task { setting, make: None }
+    pub fn set(task_config: TaskConfig) -> Self {
+        Task { task_config, make: None }
     }
 
     /// A task of a front end. `make` gets the number of agents of the run.
     pub fn made(id: String, make: impl FnOnce(usize) -> Result<Arc<dyn ShardFactory>, RunError> + 'a) -> Self {
-        Task { setting: Setting { agent: id, ..Setting::default() }, make: Some(Box::new(make)) }
+        Task { task_config: TaskConfig { agent: id, ..TaskConfig::default() }, make: Some(Box::new(make)) }
     }
 
     /// Whether a front end creates the task.
@@ -40,7 +40,7 @@ impl<'a> Task<'a> {
 
     /// Its name, such as `Hopper-v0`.
     pub fn id(&self) -> &str {
-        &self.setting.agent
+        &self.task_config.agent
     }
 
     /// The task with more options.
@@ -50,7 +50,7 @@ impl<'a> Task<'a> {
     pub fn with(self, options: &TaskOptions) -> Result<Self, RunError> {
         match self.make {
             _ if options.given.is_empty() => Ok(self),
-            None => Ok(Self::set(self.setting.with(options)?)),
+            None => Ok(Self::set(self.task_config.with(options)?)),
             Some(_) => {
                 let problem = format!("is for registered tasks; set the options of {} where you create it", self.id());
                 Err(RunError::option("option", problem))
@@ -62,16 +62,16 @@ impl<'a> Task<'a> {
     ///
     /// # Errors
     /// If they cannot be created.
-    pub fn factory(self, agents: usize) -> Result<(Arc<dyn ShardFactory>, Setting), RunError> {
-        let Task { mut setting, make } = self;
+    pub fn factory(self, agents: usize) -> Result<(Arc<dyn ShardFactory>, TaskConfig), RunError> {
+        let Task { mut task_config, make } = self;
         let factory = match make {
             Some(make) => make(agents)?,
             None => {
-                let factory = setting.factory()?;
-                setting.options = factory.spec().options.clone();
+                let factory = task_config.factory()?;
+                task_config.options = factory.spec().options.clone();
                 factory
             }
         };
-        Ok((factory, setting))
+        Ok((factory, task_config))
     }
 }

@@ -3,7 +3,7 @@
 
 use marathon_envs::VecEnvOptions;
 use marathon_learn::Policy;
-use marathon_runs::{Play, Setting};
+use marathon_runs::{Play, TaskConfig};
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
@@ -21,8 +21,8 @@ const BACKFLIP: f32 = 2.0;
 /// feet.
 fn flips(policy: &Policy, going: [f64; 3], jump: f64) -> [usize; 2] {
     let options = VecEnvOptions { agents: AGENTS, seed: 3, threads: 0, ..Default::default() };
-    let setting = Setting::of(policy.meta());
-    let mut play = Play::of(&setting, &[policy], &options).unwrap();
+    let task_config = TaskConfig::of_policy(policy.meta());
+    let mut play = Play::of(&task_config, &[policy], &options).unwrap();
     let info = play.spec().info.len();
     let (mut begun, mut over, mut landed) = ([false; AGENTS], [false; AGENTS], [false; AGENTS]);
     for decision in 0..RUN_UP + HELD {

@@ -5,20 +5,20 @@ use marathon_envs::{Clips, NamedClip, Value};
 use marathon_learn::{Activation, Control, Policy, PolicyMeta};
 use marathon_runs::distill::{DistillOptions, distill};
 use marathon_runs::folder::{RunFile, RunFolder};
-use marathon_runs::{Setting, TaskOptions};
+use marathon_runs::{TaskConfig, TaskOptions};
 use std::path::{Path, PathBuf};
 
 fn mine(clip: &str) -> NamedClip {
     NamedClip::new("mine", shipped(clip).unwrap())
 }
 
-fn man(clips: impl Into<Value>) -> Setting {
+fn man(clips: impl Into<Value>) -> TaskConfig {
     let given = vec![("clip".to_string(), clips.into())];
-    Setting::named("MarathonMan").unwrap().with(&TaskOptions { given }).unwrap()
+    TaskConfig::named("MarathonMan").unwrap().with(&TaskOptions { given }).unwrap()
 }
 
 /// A policy that has learned nothing, in a file.
-fn policy(folder: &Path, name: &str, task: &Setting) -> PathBuf {
+fn policy(folder: &Path, name: &str, task: &TaskConfig) -> PathBuf {
     let spec = task.factory().unwrap().spec().clone();
     let meta = PolicyMeta::of(&spec, vec![4], Activation::Tanh);
     let (params, obs) = (vec![0.0; (spec.obs + 1) * 4 + 5 * spec.act], (vec![0.0; spec.obs], vec![1.0; spec.obs]));
@@ -37,13 +37,13 @@ fn a_run_folder_and_a_policy_hold_clips_that_were_given_in_memory() {
     assert!(path.join("mine.motion").is_file() && path.join("mine-2.motion").is_file());
     let (folder, run) = RunFolder::open(&path).unwrap();
     assert_eq!(run.options.get("clip"), Some(&Value::Text("walk,mine.motion,mine-2.motion".into())));
-    assert_eq!(folder.setting(&run).unwrap(), task);
+    assert_eq!(folder.task_config(&run).unwrap(), task);
 
     let policy = Policy::load(&policy(temp.path(), "p.safetensors", &task)).unwrap();
     assert_eq!(policy.meta().options.get("clip"), task.options.get("clip"));
     // other arguments leave the clips, and a name chooses among them
     let with = |name: &str, value: Value| {
-        Setting::of(policy.meta()).with(&TaskOptions { given: vec![(name.into(), value)] }).unwrap().options
+        TaskConfig::of_policy(policy.meta()).with(&TaskOptions { given: vec![(name.into(), value)] }).unwrap().options
     };
     assert_eq!(with("start", "first".into()).get("clip"), task.options.get("clip"));
     assert_eq!(
@@ -59,7 +59,7 @@ fn policies_with_clips_of_one_name_teach_one_policy() {
         ["run", "kick", "run"].map(|clip| policy(temp.path(), &format!("{clip}.safetensors"), &man(mine(clip))));
     let options = DistillOptions { hidden: vec![4], steps: 2_000, agents: 16, ..Default::default() };
     let student =
-        distill(Setting::named("MarathonMan").unwrap(), &teachers, &options, &mut |_| Control::Continue).unwrap();
+        distill(TaskConfig::named("MarathonMan").unwrap(), &teachers, &options, &mut |_| Control::Continue).unwrap();
     let given = student.meta().options.given_clips();
     assert_eq!(given.keys().collect::<Vec<_>>(), [&"mine-2.motion", &"mine.motion"]);
     assert_eq!((given["mine.motion"], given["mine-2.motion"]), (&shipped("run").unwrap(), &shipped("kick").unwrap()));

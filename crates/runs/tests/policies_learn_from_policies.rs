@@ -5,16 +5,16 @@
 use marathon_envs::options::Value;
 use marathon_learn::{Control, EvalOptions, Policy, evaluate};
 use marathon_runs::distill::{DistillOptions, Distilled, distill};
-use marathon_runs::{LearnOptions, RunOptions, Session, Setting, Task, TaskOptions, imitation, policy_file};
+use marathon_runs::{LearnOptions, RunOptions, Session, Task, TaskConfig, TaskOptions, imitation, policy_file};
 use std::path::PathBuf;
 
 fn shipped(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../assets/policies").join(format!("{name}.safetensors"))
 }
 
-fn man(options: &[(&str, &str)]) -> Setting {
+fn man(options: &[(&str, &str)]) -> TaskConfig {
     let given = options.iter().map(|(name, value)| (name.to_string(), value.parse().unwrap())).collect();
-    Setting::named("MarathonMan").unwrap().with(&TaskOptions { given }).unwrap()
+    TaskConfig::named("MarathonMan").unwrap().with(&TaskOptions { given }).unwrap()
 }
 
 /// Half a minute of processor time teaches a walk and a run to one network. Each took minutes alone.
@@ -44,7 +44,8 @@ fn threads_change_nothing() {
     let learned = |threads: usize, seed: u64| {
         let options =
             DistillOptions { hidden: vec![16], steps: 20_000, agents: 32, threads, seed, ..Default::default() };
-        distill(Setting::named("hopper").unwrap(), &[shipped("hopper")], &options, &mut |_| Control::Continue).unwrap()
+        distill(TaskConfig::named("hopper").unwrap(), &[shipped("hopper")], &options, &mut |_| Control::Continue)
+            .unwrap()
     };
     let one = learned(1, 3);
     assert!(one == learned(2, 3) && one != learned(1, 4));
@@ -55,10 +56,11 @@ fn threads_change_nothing() {
 fn a_smaller_policy_hops_as_far() {
     let path = shipped("hopper");
     let options = DistillOptions { hidden: vec![48, 48], steps: 3_000_000, agents: 128, ..Default::default() };
-    let student =
-        distill(Setting::named("hopper").unwrap(), std::slice::from_ref(&path), &options, &mut |_| Control::Continue)
-            .unwrap();
-    let factory = Setting::named("hopper").unwrap().factory().unwrap();
+    let student = distill(TaskConfig::named("hopper").unwrap(), std::slice::from_ref(&path), &options, &mut |_| {
+        Control::Continue
+    })
+    .unwrap();
+    let factory = TaskConfig::named("hopper").unwrap().factory().unwrap();
     let of = |policy: &Policy| {
         let isa = marathon_physics::lanes::Isa::best();
         evaluate(&*factory, isa, policy, &EvalOptions { episodes: 64, ..Default::default() }).unwrap().return_mean
@@ -69,10 +71,10 @@ fn a_smaller_policy_hops_as_far() {
 
 #[test]
 fn teachers_that_do_not_fit_are_refused() {
-    let learn = |task: Setting, teachers: &[PathBuf]| {
+    let learn = |task: TaskConfig, teachers: &[PathBuf]| {
         distill(task, teachers, &DistillOptions::default(), &mut |_| Control::Stop).unwrap_err().to_string()
     };
-    let text = learn(Setting::named("walker").unwrap(), &[shipped("hopper")]);
+    let text = learn(TaskConfig::named("walker").unwrap(), &[shipped("hopper")]);
     assert!(text.contains("hopper.safetensors") && text.contains("actions") && text.contains("Walker2d-v0"), "{text}");
     // Marathon Man with a clip has no commands
     let text = learn(man(&[]), &[shipped("MarathonManSteer")]);

@@ -9,7 +9,7 @@ use marathon_config as config;
 use marathon_envs::{VecEnv, VecEnvOptions, registry};
 use marathon_learn::{BLOCK, Players};
 use marathon_physics::lanes::Isa;
-use marathon_runs::Setting;
+use marathon_runs::TaskConfig;
 use marathon_runs::processes::Processes;
 use marathon_runs::report::chart::Chart;
 use std::path::Path;
@@ -67,7 +67,7 @@ pub fn run(options: &Options) -> Result<Record, StudyError> {
             match processes {
                 0 => train_on(&*factory, &config, None),
                 n => {
-                    let mut players = Processes::start(&program, &Setting::named(AGENT)?, &config, n)?;
+                    let mut players = Processes::start(&program, &TaskConfig::named(AGENT)?, &config, n)?;
                     let run = train_on(&*factory, &config, Some(&mut players as &mut dyn Players))?;
                     players.error.take().map_or(Ok(run), |error| Err(error.into()))
                 }

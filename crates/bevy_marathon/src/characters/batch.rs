@@ -46,8 +46,8 @@ impl CharacterBatch {
     pub(super) fn new(kind: &CharacterKind) -> Result<Self, RagdollError> {
         let (engine, n_obs, out) = match &kind.character {
             Character::Agent(name) => {
-                let (setting, id) = (&kind.setting, kind.spec.as_ref().map_or(name, |spec| &spec.id));
-                let (registry, options) = kind.ground.registry(id, &setting.options)?;
+                let (task_config, id) = (&kind.task_config, kind.spec.as_ref().map_or(name, |spec| &spec.id));
+                let (registry, options) = kind.ground.registry(id, &task_config.options)?;
                 let options = VecEnvOptions { agents: BLOCK, autoreset: Autoreset::Disabled, options, ..default() };
                 let mut env = VecEnv::from_registry(&registry, id, &options)?;
                 let (n_obs, out) = (env.spec().obs, env.buffers());

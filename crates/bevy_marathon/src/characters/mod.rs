@@ -18,7 +18,7 @@ use bevy::prelude::*;
 use marathon_envs::Spec;
 use marathon_physics::Model;
 use marathon_physics::lanes::Isa;
-use marathon_runs::Setting;
+use marathon_runs::TaskConfig;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -36,7 +36,7 @@ pub fn spec_of_role(spec: &Spec, role: usize) -> Option<Spec> {
 pub(crate) struct CharacterKind {
     pub character: Character,
     /// The task of an agent.
-    pub setting: Setting,
+    pub task_config: TaskConfig,
     pub ground: Ground,
     pub model: Arc<Model>,
     pub spec: Option<Arc<Spec>>,
@@ -53,12 +53,17 @@ pub(crate) struct CharacterKind {
 
 impl CharacterKind {
     /// The kind of an agent of the registry in a task and on a ground, without ragdolls yet.
-    pub fn of_agent(name: &str, setting: &Setting, ground: Ground, time: Duration) -> Result<Self, RagdollError> {
-        let agent = ground.agent_with(&setting.agent, &setting.options)?;
+    pub fn of_agent(
+        name: &str,
+        task_config: &TaskConfig,
+        ground: Ground,
+        time: Duration,
+    ) -> Result<Self, RagdollError> {
+        let agent = ground.agent_with(&task_config.agent, &task_config.options)?;
         let spec = agent.clone().shards(Isa::best())?.spec().clone();
         Ok(CharacterKind {
             character: Character::Agent(name.into()),
-            setting: setting.clone(),
+            task_config: task_config.clone(),
             ground,
             model: Arc::new(agent.model()?),
             feet: agent.facts().feet.iter().map(|n| Arc::from(n.as_str())).collect(),
@@ -77,7 +82,7 @@ impl CharacterKind {
         let dt = substeps as f64 * model.opt.timestep;
         CharacterKind {
             character: Character::Prefab(prefab.clone()),
-            setting: Setting::default(),
+            task_config: TaskConfig::default(),
             ground: Ground::Level,
             model,
             feet: Vec::new(),

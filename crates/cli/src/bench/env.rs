@@ -6,7 +6,7 @@ use crate::error::CliError;
 use marathon_envs::ShardFactory;
 use marathon_physics::lanes::Isa;
 use marathon_runs::speed::{EnvSpeed, env_speed};
-use marathon_runs::{Setting, TaskOptions};
+use marathon_runs::{TaskConfig, TaskOptions};
 use serde::Serialize;
 
 /// Options of `bench env`.
@@ -55,7 +55,7 @@ pub fn run(args: &EnvArgs, json: bool) -> Result<(), CliError> {
     let mut table = Table::new(json, Head::new("env", threads), args.seconds, step);
     for id in &agents {
         for isa in isas(&args.isa) {
-            let factory = Setting::named(id)?.with(&args.task)?.factory_on(isa)?;
+            let factory = TaskConfig::named(id)?.with(&args.task)?.factory_on(isa)?;
             table.push(measure(threads, args.seconds, &*factory, isa));
         }
     }

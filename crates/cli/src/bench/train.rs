@@ -10,7 +10,7 @@ use marathon_physics::lanes::Isa;
 use marathon_runs::processes::Processes;
 use marathon_runs::speed::Sample;
 use marathon_runs::text::short;
-use marathon_runs::{Setting, TaskOptions};
+use marathon_runs::{TaskConfig, TaskOptions};
 use serde::Serialize;
 
 /// Repetitions of a row, each with its own seed.
@@ -84,7 +84,7 @@ pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
 }
 
 fn measure(args: &TrainArgs, threads: usize, id: &str, isa: Isa) -> Result<Row<Train>, CliError> {
-    let task = Setting::named(id)?.with(&args.task)?;
+    let task = TaskConfig::named(id)?.with(&args.task)?;
     let factory = task.factory_on(isa)?;
     let mut base = config::default_for(id).config;
     if let Some(width) = args.hidden.map(|width| width as usize) {

@@ -8,7 +8,7 @@ use marathon_learn::Control;
 use marathon_runs::distill::{Distilled, resumable};
 use marathon_runs::report::progress::bar;
 use marathon_runs::terminal::{interrupt, note, print_json, say};
-use marathon_runs::{Setting, output, policy_file, text};
+use marathon_runs::{TaskConfig, output, policy_file, text};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -39,7 +39,7 @@ pub fn run(args: &DistillArgs, json: bool) -> Result<(), CliError> {
     output::check(&args.out, &policy_file::ENDINGS, &read)?;
     args.options.validate()?;
     let notes = notes(&args.out);
-    let task = Setting::named(&args.agent)?.with(&args.task)?;
+    let task = TaskConfig::named(&args.agent)?.with(&args.task)?;
     let options = &args.options;
     interrupt::install("finishing this round and writing the policy")?;
     let verb = if notes.exists() { "continuing" } else { "learning" };

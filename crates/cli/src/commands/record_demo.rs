@@ -6,7 +6,7 @@ use marathon_envs::VecEnvOptions;
 use marathon_learn::{AtomicFile, Policy};
 use marathon_mlagents::{Demonstration, Episode};
 use marathon_runs::terminal::{print_json, say};
-use marathon_runs::{Play, Setting, output, text};
+use marathon_runs::{Play, TaskConfig, output, text};
 use serde::Serialize;
 use std::io::{BufWriter, Seek, Write};
 use std::path::PathBuf;
@@ -79,7 +79,7 @@ fn play(
 ) -> Result<(), CliError> {
     let (n, meta) = (episodes.min(MAX_AGENTS), policy.meta());
     let options = VecEnvOptions { agents: n, seed, ..Default::default() };
-    let mut play = Play::of(&Setting::asked(meta), &[policy], &options)?;
+    let mut play = Play::of(&TaskConfig::with_training_options(meta), &[policy], &options)?;
     let mut left: Vec<usize> = (0..n).map(|agent| (episodes - agent).div_ceil(n)).collect();
     let mut now = vec![Episode::default(); n];
     while left.iter().any(|left| *left > 0) {

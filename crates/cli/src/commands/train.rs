@@ -26,7 +26,7 @@ pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
     let stop = |_: &IterationStats| if interrupt::requested() { Control::Stop } else { Control::Continue };
     let mut processes = match args.run.processes {
         0 => None,
-        n => match Processes::start(&program::file(), &session.setting, &session.run.config, n) {
+        n => match Processes::start(&program::file(), &session.task_config, &session.run.config, n) {
             Ok(processes) => Some(processes),
             Err(error) => {
                 session.abandon();

@@ -14,7 +14,7 @@ pub use super::clips::{Clips, NamedClip};
 pub use super::value::Value;
 
 /// Arguments that only help training: outside of training, policies run with their defaults.
-pub const OF_LEARNING: [&str; 3] = ["mortal", "knocked", "relive"];
+pub const OF_LEARNING: [&str; 3] = ["end_on_fall_prob", "start_pushed_prob", "replay_falls_prob"];
 
 /// Arguments by name, in the order in which they were given. Equal ones may have been given in another order.
 #[derive(Clone, Debug, Default)]

@@ -247,13 +247,13 @@ impl<T: Real> Kernel<T> for SumReward<'_, T> {
         let mut ok = T::not(T::from_bits(ended.diverged));
         ok = T::and(ok, T::and(below(&physics.qpos, LARGEST), below(&physics.qvel, LARGEST)));
         ok = T::and(ok, T::and(below(obs, STORABLE), below(terms, STORABLE)));
-        if let Some(price) = termination_reward {
+        if let Some(reward) = termination_reward {
             // the reward of a failure replaces all other terms
             let (termination, own) = terms.split_last_mut().expect("there is a term for it");
             for term in own {
                 *term = T::masked(T::not(failed), *term);
             }
-            *termination = T::masked(failed, T::lit(price));
+            *termination = T::masked(failed, T::lit(reward));
         }
         *reward = T::zero();
         for term in &terms[..of_first] {

@@ -18,7 +18,7 @@ use marathon_envs::registry;
 use marathon_learn::EvalOptions;
 use marathon_physics::Model;
 use marathon_runs::folder::policy_path;
-use marathon_runs::{FilmOptions, LearnOptions, RunError, Setting, TaskOptions, policy_file};
+use marathon_runs::{FilmOptions, LearnOptions, RunError, TaskConfig, TaskOptions, policy_file};
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -233,7 +233,7 @@ pub fn scenario(args: &Args, shipped: &ShippedPolicies) -> Result<Scenario, Game
     let mut scenario = Scenario {
         mode: args.mode,
         agent: String::new(),
-        chosen: Setting::default(),
+        chosen: TaskConfig::default(),
         source: PolicySource::Shipped,
         agents: usize::from(args.agents),
         ground: args.ground,
@@ -284,17 +284,19 @@ pub fn scenario(args: &Args, shipped: &ShippedPolicies) -> Result<Scenario, Game
         );
         return Err(RunError::option("mode", problem).into());
     }
-    scenario.chosen = Setting::named(&scenario.agent)?.with(&args.task)?;
+    scenario.chosen = TaskConfig::named(&scenario.agent)?.with(&args.task)?;
     if scenario.mode == Mode::Course {
         scenario.course.take_from(&scenario.chosen.options);
     }
-    let setting = scenario.setting(shipped)?;
+    let task_config = scenario.task_config(shipped)?;
     if scenario.mode == Mode::Course {
-        course::check(&scenario.course, &setting)?;
+        course::check(&scenario.course, &task_config)?;
     }
     match &scenario.source {
-        PolicySource::File(path) => drop(policy_file::read(path, spec_of_role(setting.factory()?.spec(), 0).as_ref())?),
-        _ if !args.task.given.is_empty() => drop(setting.factory()?),
+        PolicySource::File(path) => {
+            drop(policy_file::read(path, spec_of_role(task_config.factory()?.spec(), 0).as_ref())?)
+        }
+        _ if !args.task.given.is_empty() => drop(task_config.factory()?),
         _ => {}
     }
     if scenario.mode == Mode::Learn {

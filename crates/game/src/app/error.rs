@@ -9,6 +9,9 @@ use thiserror::Error;
 /// Why the game does not start.
 #[derive(Debug, Error)]
 pub enum GameError {
+    /// The processor lacks an instruction that this program was built for.
+    #[error("{0}")]
+    Processor(&'static str),
     /// A missing file.
     #[error("{}: there is no such file or folder{}", .path.display(), did_you_mean(.nearest.as_ref()))]
     Missing {

@@ -21,7 +21,7 @@ use bevy_marathon::look::{
     FollowCameraPlugin, GhostPlugin, LookPlugin, MarksPlugin, Quality, SceneryPlugin, SkinPlugin,
 };
 use bevy_marathon::{Ground, MarathonPlugin};
-use marathon_runs::{RunError, Setting};
+use marathon_runs::{RunError, TaskConfig};
 
 /// Everything that the app adds to Bevy's own plugins.
 pub struct GamePlugin {
@@ -48,14 +48,14 @@ impl GamePlugin {
                 return Err(RunError::option("option", "does not go with a recording, which has its run's").into());
             }
             scenario.mode = Mode::Replay;
-            (scenario.agent, scenario.agents) = (recording.setting.agent.clone(), recording.agents);
+            (scenario.agent, scenario.agents) = (recording.task_config.agent.clone(), recording.agents);
             if Ground::ALL.contains(&recording.ground) {
                 scenario.ground = recording.ground;
             }
             playback = Some(Playback::new(recording)?);
         }
         if scenario.mode == Mode::Learn {
-            settings(&scenario.setting(&shipped)?, &TrainingOptions { learn: args.learn.clone(), seed: 0 })?;
+            settings(&scenario.task_config(&shipped)?, &TrainingOptions { learn: args.learn.clone(), seed: 0 })?;
         }
         if scenario.mode == Mode::Course {
             check_table(args.table.as_deref())?;
@@ -76,8 +76,8 @@ impl GamePlugin {
     ///
     /// # Errors
     /// If there is no such agent, or the policy's file cannot be read.
-    pub fn setting(&self) -> Result<Setting, RunError> {
-        self.scenario.setting(&self.shipped)
+    pub fn task_config(&self) -> Result<TaskConfig, RunError> {
+        self.scenario.task_config(&self.shipped)
     }
 
     /// Inserts what the command line sets.

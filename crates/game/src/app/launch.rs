@@ -14,6 +14,7 @@ use bevy::prelude::*;
 use bevy::window::{PresentMode, WindowResolution};
 use bevy_marathon::look::Quality;
 use clap::Parser;
+use marathon_physics::lanes::Isa;
 use marathon_runs::text::printable;
 use std::ffi::OsString;
 use std::io::{BufReader, Write};
@@ -51,6 +52,9 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> ExitCode {
 /// # Errors
 /// If the app cannot start; nothing has been drawn then.
 pub fn run(args: &Args) -> Result<(), GameError> {
+    if let Some(obstacle) = Isa::best().obstacle() {
+        return Err(GameError::Processor(obstacle));
+    }
     if args.runs {
         let path = args.table.clone().map_or_else(leaderboard::default_path, Ok)?;
         // the reader of a pipe may have closed it
@@ -69,8 +73,8 @@ pub fn run(args: &Args) -> Result<(), GameError> {
     }
     let remote = match args.mlagents_port {
         Some(port) => {
-            let (setting, agents) = (game.setting()?, usize::from(args.agents));
-            Some(mlagents::serve(&setting, agents, port, args.learn.threads.unwrap_or(0))?)
+            let (task_config, agents) = (game.task_config()?, usize::from(args.agents));
+            Some(mlagents::serve(&task_config, agents, port, args.learn.threads.unwrap_or(0))?)
         }
         None if args.watch_stream => Some(pipe::watch(BufReader::new(std::io::stdin()), std::io::stdout())?),
         None => None,

@@ -25,6 +25,17 @@ pub use x86::{F32x8, F32x16};
 /// Lanes of the widest backend.
 pub const MAX_LANES: usize = 16;
 
+/// Why no kernel can run on an x86-64 processor without fused multiply-add.
+const NEEDS_FMA: &str = "this processor has no fused multiply-add (FMA), and this program was built for processors \
+    that have it; build it on this machine, or with the feature `baseline` of marathon-physics";
+
+/// Ends a program that ignored [`Isa::obstacle`].
+#[cfg(all(target_arch = "x86_64", not(without_fma)))]
+#[cold]
+fn needs_fma() -> ! {
+    panic!("{NEEDS_FMA}")
+}
+
 /// A piece of work over lanes of type `T`, run by [`Real::enter`].
 ///
 /// Implementations mark `run` `#[inline(always)]`.
@@ -258,7 +269,8 @@ impl Isa {
     /// Whether this processor can run it, and this program has the kernels for it.
     pub fn supported(self) -> bool {
         match self {
-            Isa::F64 | Isa::F32 => true,
+            Isa::F64 => f64::supported(),
+            Isa::F32 => f32::supported(),
             Isa::X4 => cfg!(any(not(target_arch = "x86_64"), feature = "baseline")),
             #[cfg(target_arch = "x86_64")]
             Isa::X8 => F32x8::supported(),
@@ -273,6 +285,7 @@ impl Isa {
         match self {
             isa if isa.supported() => None,
             Isa::X4 => Some("this program was built without the feature `baseline`"),
+            Isa::F64 | Isa::F32 => Some(NEEDS_FMA),
             _ => Some("this processor does not support it"),
         }
     }

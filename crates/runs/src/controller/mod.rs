@@ -9,7 +9,7 @@ mod table;
 mod trial;
 
 use crate::error::RunError;
-use crate::setting::Setting;
+use crate::task_config::TaskConfig;
 use marathon_envs::{CommandRange, registry};
 use marathon_learn::{EvalOptions, Policy};
 use marathon_motion::Tracking;
@@ -32,7 +32,7 @@ const STOPPING: f64 = 4.0;
 const STANDING: f64 = 10.0;
 /// Limits of standing still: path of the center of mass, m, and mean speed of the bodies, m/s.
 const DRIFT: f64 = 0.1;
-const RESTLESS: f64 = 0.05;
+const STILL_SPEED: f64 = 0.05;
 /// Name of the button for a backflip, how long it is held, and the time for a flip and one second afterward, s.
 const BACKFLIP: &str = "backflip";
 const HELD: f64 = 0.25;
@@ -194,8 +194,8 @@ struct Commands {
 }
 
 impl Commands {
-    fn of(policy: &Policy, setting: &Setting) -> Result<Self, RunError> {
-        let spec = setting.factory()?.spec().clone();
+    fn of(policy: &Policy, task_config: &TaskConfig) -> Result<Self, RunError> {
+        let spec = task_config.factory()?.spec().clone();
         let number_of = |is: fn(&CommandRange) -> bool| spec.command.iter().position(is);
         let Some(speed) = number_of(CommandRange::is_speed) else {
             return Err(RunError::NoSpeed { task: policy.meta().agent.clone(), others: obedient() });
@@ -239,9 +239,9 @@ fn obedient() -> Vec<String> {
 /// # Errors
 /// If the policy's task does not exist, or has no speed command.
 pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<CommandTracking, RunError> {
-    let setting = Setting::asked(policy.meta()).from_the_first()?;
-    let commands = Commands::of(policy, &setting)?;
-    let trial = || Trial::new(&setting, policy, options, commands.speed);
+    let task_config = TaskConfig::with_training_options(policy.meta()).starting_first()?;
+    let commands = Commands::of(policy, &task_config)?;
+    let trial = || Trial::new(&task_config, policy, options, commands.speed);
     let (levels, half) = (commands.levels(), 0.5 * commands.range[1]);
     let mut responses = Vec::new();
     for from in levels {
@@ -360,7 +360,7 @@ fn stand(mut trial: Trial<'_>, commands: &Commands) -> Result<Stand, RunError> {
     let stood: Vec<[f64; 2]> = tracks.iter().filter(|track| !track.fallen).map(|track| still(&track.moments)).collect();
     let median = |i: usize| response::median(stood.iter().map(|x| x[i]).collect());
     Ok(Stand {
-        still: stood.iter().filter(|[drift, speed]| *drift < DRIFT && *speed < RESTLESS).count() as u64,
+        still: stood.iter().filter(|[drift, speed]| *drift < DRIFT && *speed < STILL_SPEED).count() as u64,
         falls: (all - stood.len()) as u64,
         drift: median(0),
         speed: median(1),

@@ -2,7 +2,7 @@
 
 use crate::error::RunError;
 use crate::play::Play;
-use crate::setting::Setting;
+use crate::task_config::TaskConfig;
 use glam::DVec3;
 use marathon_envs::{Autoreset, VecEnvOptions, registry};
 use marathon_learn::{EvalOptions, Policy};
@@ -73,7 +73,12 @@ pub struct Trial<'a> {
 impl<'a> Trial<'a> {
     /// Creates agents at the start of an episode that only a fall ends. `speed` is the index of the speed in the
     /// command.
-    pub fn new(setting: &Setting, policy: &'a Policy, options: &EvalOptions, speed: usize) -> Result<Self, RunError> {
+    pub fn new(
+        task_config: &TaskConfig,
+        policy: &'a Policy,
+        options: &EvalOptions,
+        speed: usize,
+    ) -> Result<Self, RunError> {
         let vec_options = VecEnvOptions {
             agents: options.episodes,
             seed: options.seed,
@@ -82,10 +87,10 @@ impl<'a> Trial<'a> {
             max_episode_steps: Some(usize::MAX),
             ..VecEnvOptions::default()
         };
-        let play = Play::of(setting, &[policy], &vec_options)?;
+        let play = Play::of(task_config, &[policy], &vec_options)?;
         let number = |of: &str| play.spec().info.iter().position(|name| name == of);
         let (error, rising) = (number(ERROR), number(RISING));
-        let model = registry::agent(&setting.agent)?.model()?;
+        let model = registry::agent(&task_config.agent)?.model()?;
         let root = free(&model);
         let place = |agent| Ok(Some(Place::of(&model, root, &play.qpos(agent)?, 0.0)));
         let places = (0..options.episodes).map(place).collect::<Result<_, RunError>>()?;

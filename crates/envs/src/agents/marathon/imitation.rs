@@ -18,11 +18,11 @@ use crate::agent::options::Choice;
 use crate::agent::{Following, Frame, Obs, Part, Senses, Start, Terms};
 
 /// Memory size of a character that follows a clip.
-pub(super) const MEMORY: usize = BEGUN + 1;
+pub(super) const MEMORY: usize = START_ROW + 1;
 /// Slot of the memory that counts the episode's decisions.
-const MADE: usize = Following::SLOTS;
+const DECISIONS: usize = Following::SLOTS;
 /// Slot of the memory that holds the clip row in which the episode started.
-const BEGUN: usize = MADE + 1;
+const START_ROW: usize = DECISIONS + 1;
 /// Largest height of the center of a trunk part that lies on the ground in a clip, m.
 const LYING: f64 = 0.16;
 /// A failure before this time is attributed to the start of the episode, s.
@@ -93,13 +93,13 @@ impl StartAt {
             }
         });
         start.start_in_clip(row);
-        start.memory[BEGUN] = row as f64;
+        start.memory[START_ROW] = row as f64;
     }
 }
 
 /// The row to start from in half of the episodes after a failure.
 fn try_again(start: &mut Start, dt: f64, limit: usize) -> Option<usize> {
-    let [row, made, begun] = [Following::ROW, MADE, BEGUN].map(|slot| start.previous[slot] as usize);
+    let [row, made, begun] = [Following::ROW, DECISIONS, START_ROW].map(|slot| start.previous[slot] as usize);
     let at_its_end = start.clips().any(|rows| row + 1 == rows.end);
     let failed = made > 0 && made < limit && !at_its_end;
     if !failed || start.random.whole(0, 1) == 0 {
@@ -119,7 +119,7 @@ fn try_again(start: &mut Start, dt: f64, limit: usize) -> Option<usize> {
 #[inline(always)]
 pub(super) fn remember<T: Real>(s: &Senses<T>, memory: &mut [T]) {
     s.follow(memory);
-    memory[MADE] += T::lit(1.0);
+    memory[DECISIONS] += T::lit(1.0);
 }
 
 /// Adds the terms of DeepMimic's reward. `sharpness` multiplies the scales of the pose terms; it is 1 in DeepMimic.

@@ -5,6 +5,7 @@
 
 pub mod ant;
 pub mod controller;
+mod fall_replay;
 mod heading;
 pub mod hopper;
 pub mod humanoid;
@@ -12,7 +13,6 @@ mod idle;
 mod imitation;
 pub mod in_style;
 pub mod marathon_man;
-mod relive;
 pub mod terrain;
 pub mod walker2d;
 

@@ -14,7 +14,7 @@ use bevy::window::FileDragAndDrop;
 use bevy_marathon::RagdollState;
 use bevy_marathon::look::{ErrorColors, Ghost};
 use marathon_envs::options::Value;
-use marathon_runs::{Flags, RunError, Setting, TaskOptions};
+use marathon_runs::{Flags, RunError, TaskConfig, TaskOptions};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -46,7 +46,7 @@ pub struct Imitation {
 #[derive(Resource)]
 pub struct Reading {
     path: PathBuf,
-    answer: Arc<Mutex<Option<Result<Setting, String>>>>,
+    answer: Arc<Mutex<Option<Result<TaskConfig, String>>>>,
 }
 
 pub(super) fn plugin(app: &mut App) {
@@ -100,15 +100,15 @@ fn take_files(
         }
         let base = match clip_of(&scenario, &shipped) {
             Some(_) if scenario.chosen.agent == scenario.agent => scenario.chosen.clone(),
-            Some(_) => Setting { agent: scenario.agent.clone(), ..default() },
-            None => Setting { agent: FOLLOWER.into(), ..default() },
+            Some(_) => TaskConfig { agent: scenario.agent.clone(), ..default() },
+            None => TaskConfig { agent: FOLLOWER.into(), ..default() },
         };
         notes.say(format!("reading {}", path.display()));
         let answer = Arc::new(Mutex::new(None));
         let (theirs, file) = (answer.clone(), path.clone());
         let read = move || {
-            let setting = with_clip(base, &file).map_err(|e| e.spelled(&Flags("marathon")));
-            *theirs.lock().unwrap_or_else(PoisonError::into_inner) = Some(setting);
+            let task_config = with_clip(base, &file).map_err(|e| e.spelled(&Flags("marathon")));
+            *theirs.lock().unwrap_or_else(PoisonError::into_inner) = Some(task_config);
         };
         match std::thread::Builder::new().name("marathon-clip".into()).spawn(read) {
             // this replaces a clip that is still being read
@@ -119,11 +119,11 @@ fn take_files(
 }
 
 /// Sets the clip of a file in a task, and checks that its environments can be made.
-fn with_clip(base: Setting, path: &Path) -> Result<Setting, RunError> {
+fn with_clip(base: TaskConfig, path: &Path) -> Result<TaskConfig, RunError> {
     let given = vec![(CLIP.to_string(), Value::Text(path.to_string_lossy().into_owned()))];
-    let setting = base.with(&TaskOptions { given })?;
-    setting.factory()?;
-    Ok(setting)
+    let task_config = base.with(&TaskOptions { given })?;
+    task_config.factory()?;
+    Ok(task_config)
 }
 
 /// Lets the characters follow the clip that has been read.
@@ -137,17 +137,17 @@ fn take_clip(
     let Some(reading) = reading else { return };
     let Some(answer) = reading.answer.lock().unwrap_or_else(PoisonError::into_inner).take() else { return };
     commands.remove_resource::<Reading>();
-    let setting = match answer {
-        Ok(setting) => setting,
+    let task_config = match answer {
+        Ok(task_config) => task_config,
         Err(error) => return notes.error(error),
     };
     if scenario.mode != Mode::Learn {
         scenario.mode = Mode::Imitate;
     }
-    if scenario.agent != setting.agent || (scenario.source == PolicySource::Nothing && scenario.model.is_some()) {
+    if scenario.agent != task_config.agent || (scenario.source == PolicySource::Nothing && scenario.model.is_some()) {
         scenario.source = if scenario.mode == Mode::Learn { PolicySource::Trainer } else { PolicySource::Shipped };
     }
-    (scenario.agent, scenario.chosen, scenario.model) = (setting.agent.clone(), setting, None);
+    (scenario.agent, scenario.chosen, scenario.model) = (task_config.agent.clone(), task_config, None);
     loads.write(LoadScenario);
     let key = if scenario.mode == Mode::Learn { "" } else { "; learn live: L" };
     notes.say(format!("following {}{key}", reading.path.display()));

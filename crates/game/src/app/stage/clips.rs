@@ -7,7 +7,7 @@ use marathon_envs::Clips;
 use marathon_envs::agents::marathon::marathon_man::clips;
 use marathon_envs::options::OptionValue;
 use marathon_envs::registry;
-use marathon_runs::Setting;
+use marathon_runs::TaskConfig;
 
 /// An agent that follows any clip.
 pub const FOLLOWER: &str = "MarathonMan-v0";
@@ -21,16 +21,16 @@ pub fn follows_clip(agent: &str) -> bool {
 
 /// The clip that the agent of a scenario follows, if it follows any clip.
 pub fn clip_of(scenario: &Scenario, shipped: &ShippedPolicies) -> Option<String> {
-    let setting = scenario.setting(shipped).ok()?;
-    let infos = registry::agent(&setting.agent).ok()?.options();
+    let task_config = scenario.task_config(shipped).ok()?;
+    let infos = registry::agent(&task_config.agent).ok()?.options();
     let default = infos.into_iter().find(|info| info.name == CLIP)?.value;
-    Clips::read(setting.options.get(CLIP).unwrap_or(&default)).map(|clips| clips.to_string())
+    Clips::read(task_config.options.get(CLIP).unwrap_or(&default)).map(|clips| clips.to_string())
 }
 
 /// Sets the clip that the agent of a scenario follows.
 pub fn choose_clip(scenario: &mut Scenario, name: &str) {
     let chosen = std::mem::take(&mut scenario.chosen);
-    let mut chosen = if chosen.agent == scenario.agent { chosen } else { Setting::default() };
+    let mut chosen = if chosen.agent == scenario.agent { chosen } else { TaskConfig::default() };
     chosen.agent.clone_from(&scenario.agent);
     chosen.options.set(CLIP, name);
     scenario.chosen = chosen;

@@ -4,7 +4,7 @@ use bevy_marathon::{AgentCommand, Ground, Held, LaidGround};
 use clap::ValueEnum;
 use marathon_envs::options::Value;
 use marathon_envs::{Options, Spec, VecEnvOptions, registry};
-use marathon_runs::{RunError, Setting};
+use marathon_runs::{RunError, TaskConfig};
 
 /// The agent whose courses are laid below agents without courses of their own. They are the same at every y.
 const MODEL: &str = "TerrainWalker2d-v0";
@@ -89,15 +89,15 @@ impl CourseOptions {
 
     /// Sets this course as an option of the task, if the task takes one. Every episode has this difficulty, unless the user
     /// has chosen other levels.
-    pub fn applied(&self, mut setting: Setting, chosen: Option<&Setting>) -> Setting {
-        if has_own(&setting.agent) {
-            setting.options.set("course", self.kind());
-            setting.options.set("difficulty", self.difficulty);
+    pub fn applied(&self, mut task_config: TaskConfig, chosen: Option<&TaskConfig>) -> TaskConfig {
+        if has_own(&task_config.agent) {
+            task_config.options.set("course", self.kind());
+            task_config.options.set("difficulty", self.difficulty);
             if chosen.is_none_or(|chosen| chosen.options.get("levels").is_none()) {
-                setting.options.set("levels", "fixed");
+                task_config.options.set("levels", "fixed");
             }
         }
-        setting
+        task_config
     }
 
     /// The point ahead of the runner that the camera looks at, and its distance, m; `usual` is that of other modes. The player
@@ -127,10 +127,10 @@ impl CourseOptions {
 
     /// The course of a seed: that of the first Walker in its first episode.
     fn elevations(&self, seed: u64) -> Result<Vec<f32>, RunError> {
-        let mut setting = Setting::named(MODEL)?;
-        setting.options.set("course", self.kind());
-        setting.options.set("difficulty", self.difficulty);
-        let mut env = setting.vec_env(&VecEnvOptions { agents: 1, seed, ..VecEnvOptions::default() })?;
+        let mut task_config = TaskConfig::named(MODEL)?;
+        task_config.options.set("course", self.kind());
+        task_config.options.set("difficulty", self.difficulty);
+        let mut env = task_config.vec_env(&VecEnvOptions { agents: 1, seed, ..VecEnvOptions::default() })?;
         let mut obs = vec![0.0_f32; env.spec().obs];
         env.reset(Some(seed), &mut obs)?;
         Ok(env.ground(0, 0)?)
@@ -146,10 +146,10 @@ pub fn has_own(agent: &str) -> bool {
 ///
 /// # Errors
 /// The text names an agent that is possible.
-pub fn check(course: &CourseOptions, setting: &Setting) -> Result<(), RunError> {
-    let (agent, own) = (&setting.agent, has_own(&setting.agent));
+pub fn check(course: &CourseOptions, task_config: &TaskConfig) -> Result<(), RunError> {
+    let (agent, own) = (&task_config.agent, has_own(&task_config.agent));
     match course.role {
-        PlayerRole::Run if setting.factory()?.spec().command.is_empty() => {
+        PlayerRole::Run if task_config.factory()?.spec().command.is_empty() => {
             let problem = format!("run is for agents that take commands, {agent} takes none; {LED} does");
             Err(RunError::option("role", problem))
         }
@@ -165,9 +165,9 @@ pub fn check(course: &CourseOptions, setting: &Setting) -> Result<(), RunError> 
         }
         // the tasks know their courses, and the ground knows which floors it can replace
         _ if !own => {
-            Ground::Track.agent_with(agent, &setting.options)?;
+            Ground::Track.agent_with(agent, &task_config.options)?;
             course.elevations(0).map(drop)
         }
-        _ => setting.factory().map(drop),
+        _ => task_config.factory().map(drop),
     }
 }

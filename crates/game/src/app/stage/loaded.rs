@@ -8,7 +8,7 @@ use crate::app::stage::policies::{ShippedPolicies, read_file};
 use crate::app::stage::scenario::{LoadScenario, PolicySource, Scenario};
 use bevy::prelude::*;
 use bevy_marathon::{Ground, PolicyAsset};
-use marathon_runs::Setting;
+use marathon_runs::TaskConfig;
 use std::path::Path;
 use std::time::SystemTime;
 
@@ -21,7 +21,7 @@ pub struct LoadedPolicy {
     /// The asset that all actors have.
     pub policy: Option<Handle<PolicyAsset>>,
     /// The task.
-    pub setting: Setting,
+    pub task_config: TaskConfig,
     /// The ground.
     pub ground: Ground,
     /// The policies of the task's roles, by file and checksum.
@@ -39,13 +39,13 @@ pub(super) fn plugin(app: &mut App) {
 /// Reads the policy of a scenario, and names it; the text of an error names the remedy.
 pub fn read_policy(
     scenario: &Scenario,
-    setting: &Setting,
+    task_config: &TaskConfig,
     shipped: &ShippedPolicies,
 ) -> Result<Option<(PolicyAsset, String)>, String> {
     let own = || shipped.named(&scenario.agent, &format!("{}.safetensors", file_stem(&scenario.agent)));
     match &scenario.source {
         PolicySource::Nothing | PolicySource::Trainer => Ok(None),
-        PolicySource::File(path) => read_file(path, setting, 0).map(Some),
+        PolicySource::File(path) => read_file(path, task_config, 0).map(Some),
         PolicySource::Shipped if scenario.mode == Mode::Testbed => Ok(None),
         // without a policy, the servos alone follow the clip for a while
         PolicySource::Shipped if scenario.mode == Mode::Imitate => Ok(own()),
@@ -61,16 +61,16 @@ pub fn read_policy(
 
 /// Reads the policy of the task's second role, which runs write beside that of the first. `None` if there is no such file, or
 /// if the player has that role.
-pub fn read_opponent(scenario: &Scenario, setting: &Setting) -> Result<Option<(PolicyAsset, String)>, String> {
+pub fn read_opponent(scenario: &Scenario, task_config: &TaskConfig) -> Result<Option<(PolicyAsset, String)>, String> {
     let PolicySource::File(path) = &scenario.source else { return Ok(None) };
     if scenario.mode == Mode::Course && scenario.course.role == PlayerRole::Build {
         return Ok(None);
     }
-    let factory = setting.factory().map_err(|e| e.to_string())?;
+    let factory = task_config.factory().map_err(|e| e.to_string())?;
     let Some(role) = factory.spec().roles.get(1) else { return Ok(None) };
     let [stem, end] = [path.file_stem(), path.extension()].map(|part| part.unwrap_or_default().to_string_lossy());
     let beside = path.with_file_name(format!("{stem}-{}.{end}", role.name));
-    if beside.exists() { read_file(&beside, setting, 1).map(Some) } else { Ok(None) }
+    if beside.exists() { read_file(&beside, task_config, 1).map(Some) } else { Ok(None) }
 }
 
 /// When a file was written.
@@ -99,11 +99,11 @@ pub fn reload(
     }
     loaded.written = now;
     // the policy of another run may have another clip
-    if scenario.setting(&shipped).is_ok_and(|setting| setting != loaded.setting) {
+    if scenario.task_config(&shipped).is_ok_and(|task_config| task_config != loaded.task_config) {
         loads.write(LoadScenario);
         return;
     }
-    match read_policy(&scenario, &loaded.setting, &shipped) {
+    match read_policy(&scenario, &loaded.task_config, &shipped) {
         Ok(Some((policy, name))) => {
             loaded.names[0] = Some(name);
             let steps = policy.0.meta().training.as_ref().map(|t| t.steps);

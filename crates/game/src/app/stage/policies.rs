@@ -4,7 +4,7 @@ use bevy::prelude::*;
 use bevy_marathon::{PolicyAsset, spec_of_role};
 use marathon_learn::{Policy as Net, checksum};
 use marathon_physics::budget;
-use marathon_runs::{Setting, policy_file};
+use marathon_runs::{TaskConfig, policy_file};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -78,9 +78,9 @@ fn name_of(path: &Path, bytes: &[u8]) -> String {
 ///
 /// # Errors
 /// The text names the remedy.
-pub fn read_file(path: &Path, setting: &Setting, role: usize) -> Result<(PolicyAsset, String), String> {
+pub fn read_file(path: &Path, task_config: &TaskConfig, role: usize) -> Result<(PolicyAsset, String), String> {
     let policy =
-        setting.factory().and_then(|factory| policy_file::read(path, spec_of_role(factory.spec(), role).as_ref()));
+        task_config.factory().and_then(|factory| policy_file::read(path, spec_of_role(factory.spec(), role).as_ref()));
     let policy = policy.map_err(|e| e.to_string())?;
     let bytes = budget::read(path, &budget::POLICY_FILE).map_err(|e| format!("{}: {e}", path.display()))?;
     Ok((policy.into(), name_of(path, &bytes)))

@@ -5,7 +5,7 @@ use crate::app::stage::course::{self, CourseOptions};
 use crate::app::stage::policies::ShippedPolicies;
 use bevy::prelude::*;
 use bevy_marathon::Ground;
-use marathon_runs::{RunError, Setting, policy_file};
+use marathon_runs::{RunError, TaskConfig, policy_file};
 use std::path::PathBuf;
 
 /// The requested scenario. A change takes effect with a [`LoadScenario`].
@@ -17,7 +17,7 @@ pub struct Scenario {
     pub agent: String,
     /// Options of the task that the user has chosen, which override those of the policy. Options of another agent are
     /// ignored.
-    pub chosen: Setting,
+    pub chosen: TaskConfig,
     /// The policy of the characters.
     pub source: PolicySource,
     /// Number of characters.
@@ -54,19 +54,19 @@ impl Scenario {
     ///
     /// # Errors
     /// If there is no such agent, or the policy's file cannot be read.
-    pub fn setting(&self, shipped: &ShippedPolicies) -> Result<Setting, RunError> {
-        let named = Setting::named(&self.agent)?;
+    pub fn task_config(&self, shipped: &ShippedPolicies) -> Result<TaskConfig, RunError> {
+        let named = TaskConfig::named(&self.agent)?;
         let noted = match &self.source {
             PolicySource::File(path) => policy_file::task_of(path)?,
-            PolicySource::Shipped => shipped.policy(&self.agent).map(|policy| Setting::of(policy.0.meta())),
+            PolicySource::Shipped => shipped.policy(&self.agent).map(|policy| TaskConfig::of_policy(policy.0.meta())),
             PolicySource::Trainer | PolicySource::Nothing => None,
         };
         let noted = noted.filter(|noted| noted.agent == named.agent).unwrap_or(named);
         let chosen = Some(&self.chosen).filter(|chosen| chosen.agent == noted.agent);
-        let setting = chosen.map_or_else(|| noted.clone(), |chosen| noted.clone().overlaid(chosen));
+        let task_config = chosen.map_or_else(|| noted.clone(), |chosen| noted.clone().overlay(chosen));
         Ok(match self.mode {
-            Mode::Course => self.course.applied(setting, chosen),
-            _ => setting,
+            Mode::Course => self.course.applied(task_config, chosen),
+            _ => task_config,
         })
     }
 
@@ -87,9 +87,9 @@ impl Scenario {
     /// Changes what moves the characters. A file brings its own task; anything else keeps the present one.
     pub fn play(&mut self, source: PolicySource, shipped: &ShippedPolicies) {
         self.chosen = match source {
-            PolicySource::File(_) => Setting::default(),
+            PolicySource::File(_) => TaskConfig::default(),
             // a file that can no longer be read has no task to keep
-            _ => self.setting(shipped).unwrap_or_default(),
+            _ => self.task_config(shipped).unwrap_or_default(),
         };
         self.source = source;
     }

@@ -28,7 +28,8 @@ pub fn switch_mode(scenario: &mut Scenario, mode: Mode, shipped: &ShippedPolicie
 
 /// Changes the agent if the player's role on the course is not possible with it.
 pub fn fit_to_course(scenario: &mut Scenario, shipped: &ShippedPolicies) {
-    let fits = scenario.setting(shipped).is_ok_and(|setting| course::check(&scenario.course, &setting).is_ok());
+    let fits =
+        scenario.task_config(shipped).is_ok_and(|task_config| course::check(&scenario.course, &task_config).is_ok());
     if !fits {
         scenario.agent = if scenario.course.role == PlayerRole::Run { LED.into() } else { BUILT_AGAINST.into() };
         scenario.play(PolicySource::Shipped, shipped);
@@ -38,7 +39,7 @@ pub fn fit_to_course(scenario: &mut Scenario, shipped: &ShippedPolicies) {
 /// Whether the player's role on the course is possible with an agent and the policy that comes with it.
 fn fits_course(scenario: &Scenario, agent: &str, shipped: &ShippedPolicies) -> bool {
     let other = Scenario { agent: agent.into(), source: PolicySource::Shipped, ..scenario.clone() };
-    other.setting(shipped).is_ok_and(|setting| course::check(&other.course, &setting).is_ok())
+    other.task_config(shipped).is_ok_and(|task_config| course::check(&other.course, &task_config).is_ok())
 }
 
 /// Switches to the next agent that has a policy. Returns whether the scenario has changed.

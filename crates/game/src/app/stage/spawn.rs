@@ -15,7 +15,7 @@ use bevy_marathon::{
 use marathon_envs::registry;
 use marathon_physics::Model;
 use marathon_render::Scene;
-use marathon_runs::{Flags, RunError, Setting};
+use marathon_runs::{Flags, RunError, TaskConfig};
 use std::sync::Arc;
 
 /// Seconds that a fallen character lies before it restarts.
@@ -131,16 +131,16 @@ fn cast(
     let testbed = scenario.mode == Mode::Testbed;
     let model = match scenario.model.as_ref().filter(|_| testbed) {
         Some(path) => Model::from_xml_file(path).map_err(|e| e.to_string()),
-        None => task_model(scenario, shipped, &mut loaded.setting).map_err(spelled),
+        None => task_model(scenario, shipped, &mut loaded.task_config).map_err(spelled),
     };
     loaded.ground = scenario.stands_on();
     let model = Arc::new(model?);
     let ragdoll = if testbed {
         Ragdoll::prefab(prefabs.add(RagdollPrefab { model: model.clone() }))
     } else {
-        Ragdoll::agent(&scenario.agent).on(loaded.ground).with_setting(loaded.setting.clone())
+        Ragdoll::agent(&scenario.agent).on(loaded.ground).with_task_config(loaded.task_config.clone())
     };
-    match read_policy(scenario, &loaded.setting, shipped) {
+    match read_policy(scenario, &loaded.task_config, shipped) {
         Ok(Some((policy, name))) => {
             loaded.policy = Some(policies.add(policy));
             loaded.names[0] = Some(name);
@@ -153,7 +153,7 @@ fn cast(
         Err(text) => notes.error(text),
     }
     let mut opponent = None;
-    match read_opponent(scenario, &loaded.setting) {
+    match read_opponent(scenario, &loaded.task_config) {
         Ok(Some((policy, name))) => {
             opponent = Some(policies.add(policy));
             loaded.names[1] = Some(name);
@@ -164,7 +164,7 @@ fn cast(
     let mut equipment = None;
     if scenario.mode == Mode::Course {
         let equip = |spec: &_| scenario.course.equipment(scenario.seed, loaded.ground, spec);
-        equipment = Some(loaded.setting.factory().and_then(|factory| equip(factory.spec())).map_err(spelled)?);
+        equipment = Some(loaded.task_config.factory().and_then(|factory| equip(factory.spec())).map_err(spelled)?);
     }
     if let PolicySource::File(path) = &scenario.source {
         loaded.written = written(path);
@@ -177,11 +177,11 @@ fn cast(
 }
 
 /// The model of the scenario's task. Puts the task at `setting`.
-fn task_model(scenario: &Scenario, shipped: &ShippedPolicies, setting: &mut Setting) -> Result<Model, RunError> {
-    let task = scenario.setting(shipped)?;
+fn task_model(scenario: &Scenario, shipped: &ShippedPolicies, task_config: &mut TaskConfig) -> Result<Model, RunError> {
+    let task = scenario.task_config(shipped)?;
     if scenario.mode == Mode::Course {
         course::check(&scenario.course, &task)?;
     }
-    *setting = task;
-    Ok(registry::agent(&setting.agent)?.with_options(&setting.options)?.model()?)
+    *task_config = task;
+    Ok(registry::agent(&task_config.agent)?.with_options(&task_config.options)?.model()?)
 }

@@ -259,14 +259,14 @@ mod tests {
     use crate::app::features;
     use crate::app::stage::policies::ShippedPolicies;
     use clap::Parser;
-    use marathon_runs::Setting;
+    use marathon_runs::TaskConfig;
 
     /// The hints for a command line: the line and the list.
     #[allow(clippy::type_complexity, reason = "a line and a list")]
     fn hints(words: &[&str], pads: bool) -> Result<(Vec<(String, String)>, Vec<Row>), Box<dyn std::error::Error>> {
         let args = Args::parse_from([&["marathon-game"], words].concat());
         let scenario = cli::scenario(&args, &ShippedPolicies::decode())?;
-        let ranges = Setting::named(&scenario.agent)?.factory()?.spec().command.clone();
+        let ranges = TaskConfig::named(&scenario.agent)?.factory()?.spec().command.clone();
         let steering = Steering { on: !ranges.is_empty(), buttons: controls(&ranges).iter().any(|c| c.keys == "W") };
         let (bindings, key_hints) = (Bindings::default(), features::key_hints());
         let hints = Hints {

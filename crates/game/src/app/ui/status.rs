@@ -220,7 +220,7 @@ fn clip(ui: &mut Ui, anatomy: &Anatomy, episode: &Episode) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use marathon_runs::Setting;
+    use marathon_runs::TaskConfig;
 
     #[test]
     fn slow_frames_are_shown() {
@@ -241,7 +241,7 @@ mod tests {
 
     #[test]
     fn the_speed_has_the_direction_of_the_command() -> Result<(), Box<dyn std::error::Error>> {
-        let spec = Setting::named("AntController")?.factory()?.spec().clone();
+        let spec = TaskConfig::named("AntController")?.factory()?.spec().clone();
         let names: Vec<&str> = spec.command.iter().map(|range| range.name.as_str()).collect();
         let speeds = spec.command.iter().filter(|range| range.is_speed()).count();
         assert_eq!(speeds, 2, "{names:?}");
@@ -259,7 +259,7 @@ mod tests {
         assert_eq!(shown(0.0, 0.0, [0.1, 0.3]), 0.1, "it stands");
         assert_eq!(shown(0.0, -1.0, [0.1, -0.8]), 0.8, "aside, as commanded");
         assert!((shown(1.0, 1.0, [1.0, 1.0]) - 2.0_f32.sqrt()).abs() < 1e-6);
-        let hopper = Setting::named("hopper")?.factory()?.spec().clone();
+        let hopper = TaskConfig::named("hopper")?.factory()?.spec().clone();
         assert_eq!(shown_speed(&hopper, &Episode { speed: 1.5, ..default() }), 1.5);
         Ok(())
     }

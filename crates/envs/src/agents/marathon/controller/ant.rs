@@ -56,13 +56,13 @@ const OBSERVATION: usize = 19 + 2 * HINGES;
 /// 20 seconds.
 const MAX_EPISODE_STEPS: usize = 2000;
 /// Highest commanded speed ahead or back, m/s.
-const FASTEST: f64 = 3.0;
+const MAX_SPEED: f64 = 3.0;
 /// Highest commanded speed to a side, m/s.
-const SIDEWAYS: f64 = 2.0;
+const MAX_TURN_ACCELERATION: f64 = 2.0;
 /// Highest commanded turn rate, rad/s.
-const SHARPEST: f64 = FRAC_PI_2;
+const MAX_TURN: f64 = FRAC_PI_2;
 /// Largest angle between the commanded direction and the heading, rad.
-const MOST_BEHIND: f64 = 1.0;
+const MAX_HEADING_LAG: f64 = 1.0;
 /// Shortest and longest duration of a command, decisions.
 const HOLDS: [usize; 2] = [100, 400];
 /// Fraction of commands that are to stand.
@@ -75,7 +75,7 @@ const RESTS: [usize; 2] = [200, 800];
 const STILL: f64 = 0.3;
 /// Mean squares of the parts' velocities at which each part drops to 1/e, m^2/s^2. The first part rewards coming to
 /// rest, the last keeping still.
-const RESTLESS: [f64; 3] = [0.4, 0.04, 0.004];
+const STILLNESS_SCALES: [f64; 3] = [0.4, 0.04, 0.004];
 
 /// The Ant with commands.
 #[derive(Clone, Copy, Debug, Default)]
@@ -115,9 +115,9 @@ impl Agent for AntController {
             metrics: names(["forward", "velocity_error", "heading_error"]),
             parts: names(PARTS),
             command: vec![
-                CommandRange::new("speed", -FASTEST..=FASTEST, "m/s"),
-                CommandRange::new("left", -SIDEWAYS..=SIDEWAYS, "m/s"),
-                CommandRange::new("turn", -SHARPEST..=SHARPEST, "rad/s"),
+                CommandRange::new("speed", -MAX_SPEED..=MAX_SPEED, "m/s"),
+                CommandRange::new("left", -MAX_TURN_ACCELERATION..=MAX_TURN_ACCELERATION, "m/s"),
+                CommandRange::new("turn", -MAX_TURN..=MAX_TURN, "rad/s"),
             ],
             memory: 2,
             ..AntV0.facts()
@@ -127,9 +127,9 @@ impl Agent for AntController {
     fn command(&self, random: &mut EpisodeRng, _: usize, out: &mut [f64]) -> usize {
         let moves = random.uniform(0.0, 1.0) >= STANDING;
         let [sideways, turns] = [(); 2].map(|()| moves && random.uniform(0.0, 1.0) >= STRAIGHT);
-        out[0] = if moves { random.around_zero(FASTEST) } else { 0.0 };
-        out[1] = if sideways { random.around_zero(SIDEWAYS) } else { 0.0 };
-        out[2] = if turns { random.around_zero(SHARPEST) } else { 0.0 };
+        out[0] = if moves { random.around_zero(MAX_SPEED) } else { 0.0 };
+        out[1] = if sideways { random.around_zero(MAX_TURN_ACCELERATION) } else { 0.0 };
+        out[2] = if turns { random.around_zero(MAX_TURN) } else { 0.0 };
         let [least, most] = if moves { HOLDS } else { RESTS };
         random.whole(least, most)
     }
@@ -142,7 +142,7 @@ impl Agent for AntController {
     #[inline(always)]
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         let turn = |angle: T| s.command(2).mul_add(T::lit(s.dt()), angle);
-        let direction = heading::turned(s.heading(TORSO), [memory[0], memory[1]], turn, MOST_BEHIND);
+        let direction = heading::turned(s.heading(TORSO), [memory[0], memory[1]], turn, MAX_HEADING_LAG);
         memory.copy_from_slice(&direction);
     }
 
@@ -187,7 +187,7 @@ impl Agent for AntController {
         // commanded to stand without a turn
         let told = s.command(0).abs().max(s.command(1).abs()).max(s.command(2).abs());
         let rest = told.neg_mul_add(T::lit(10.0), T::lit(1.0)).max(T::zero());
-        let [fidgets, rests, stirs] = super::stillness(s, PARTS.len(), RESTLESS);
+        let [fidgets, rests, stirs] = super::stillness(s, PARTS.len(), STILLNESS_SCALES);
         terms.add("still", STILL, rest * (fidgets + rests + stirs));
         terms.add("effort", -0.05, s.effort_mean(Motors::NONE));
     }

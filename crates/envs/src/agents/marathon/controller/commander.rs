@@ -7,7 +7,7 @@
 
 use marathon_physics::lanes::Real;
 
-use super::{Controller, FASTEST, Figure, Input};
+use super::{Controller, Figure, Input, MAX_SPEED};
 use crate::agent::{Obs, RoleFacts, Senses, Terms, names};
 
 /// Names of the roles.
@@ -71,9 +71,9 @@ pub(super) fn remember<F: Figure, T: Real>(controller: &Controller<F>, s: &Sense
     memory[NEXT] = match controller.arguments.input {
         Input::Discrete => {
             let right = T::masked(T::lit(PRESSED).lt(action), one);
-            (right - T::masked(action.lt(T::lit(-PRESSED)), one)) * T::lit(FASTEST)
+            (right - T::masked(action.lt(T::lit(-PRESSED)), one)) * T::lit(MAX_SPEED)
         }
-        Input::Continuous => action * T::lit(FASTEST),
+        Input::Continuous => action * T::lit(MAX_SPEED),
     };
     memory[NEXT + 1] = match controller.arguments.input {
         Input::Discrete => T::masked(T::lit(PRESSED).lt(s.action(F::MOTORS + 1)), one),
@@ -110,6 +110,6 @@ pub(super) fn observe<F: Figure, T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
 /// Adds the commander's reward for the velocity error `off`, m/s, and for a fall.
 #[inline(always)]
 pub(super) fn add_terms<T: Real>(off: T, fallen: T::Mask, terms: &mut Terms<T>) {
-    terms.add(TERMS[0], 1.0 / FASTEST, off);
+    terms.add(TERMS[0], 1.0 / MAX_SPEED, off);
     terms.add(TERMS[1], FELLED, T::masked(fallen, T::lit(1.0)));
 }

@@ -29,9 +29,9 @@ pub use figures::Figure;
 
 use marathon_physics::lanes::Real;
 
+use super::fall_replay::FallReplay;
 use super::hopper::HopperV0;
 use super::idle;
-use super::relive::Relive;
 use super::walker2d::Walker2dV1;
 use crate::agent::options::Choice;
 use crate::agent::senses::clamp;
@@ -43,7 +43,7 @@ use crate::episode_rng::EpisodeRng;
 use schedule::Schedule;
 
 /// Highest commanded speed, m/s. The original calls it 1.
-pub const FASTEST: f64 = 4.0;
+pub const MAX_SPEED: f64 = 4.0;
 /// Slots of the memory: the torso's velocity along x at the last three decisions, m/s. The original averages nine
 /// physics steps.
 const VELOCITIES: usize = 3;
@@ -71,7 +71,7 @@ const SHARPNESS: f64 = 4.0;
 /// Cost of a velocity error of 1 m/s.
 const PRICE: f64 = 1.0;
 /// Velocity error at which the `pace` term is 0, m/s: standing under a command to run.
-const WORTHLESS: f64 = FASTEST;
+const WORTHLESS: f64 = MAX_SPEED;
 /// The `late` term per decision, until a standing figure has performed a commanded jump.
 const LATE: f64 = -6.0;
 /// Fraction of the `late` term that is waived once the center of mass has risen at 1 m/s. It rewards pushing off before
@@ -81,7 +81,7 @@ const RISEN: f64 = 0.6;
 const STILL: f64 = 1.5;
 /// Mean squares of the parts' velocities at which the two halves drop to 1/e, m^2/s^2. The first half rewards coming to
 /// rest, the second keeping still.
-const RESTLESS: [f64; 2] = [0.4, 0.04];
+const STILLNESS_SCALES: [f64; 2] = [0.4, 0.04];
 
 /// The Hopper with a commanded velocity.
 pub type HopperController = Controller<HopperV0>;
@@ -127,9 +127,9 @@ crate::options! {
         /// Source of the commands if no caller sets them: the `schedule`, or an `adversary` that learns too.
         commander: Commander = Commander::Schedule,
         /// Penalty of a fall. It replaces all other terms of that decision.
-        price: Scale = Scale(40.0),
+        fall_penalty: Scale = Scale(40.0),
         /// Fraction of the episodes that start 0.75 to 1.5 s before the last fall, once there is one (0 to 1).
-        relive: Share = Share(0.0),
+        replay_falls_prob: Share = Share(0.0),
     }
 }
 
@@ -149,9 +149,15 @@ impl<F: Figure> Controller<F> {
 
     /// The stored states from before a fall.
     #[inline(always)]
-    fn relive(&self) -> Relive {
+    fn fall_replay(&self) -> FallReplay {
         let slot = if self.is_opposed() { commander::MEMORY } else { MEMORY };
-        Relive { slot, share: self.arguments.relive.0, joints: [3 + F::MOTORS; 2], places: 1, also: None }
+        FallReplay {
+            slot,
+            share: self.arguments.replay_falls_prob.0,
+            joints: [3 + F::MOTORS; 2],
+            places: 1,
+            also: None,
+        }
     }
 
     /// Number `i` of the command. With `observing`, it is the command that applies from now on. Otherwise it is the one
@@ -190,7 +196,7 @@ pub(super) fn stillness<T: Real, const N: usize>(s: &Senses<T>, parts: usize, re
 impl<F: Figure> Agent for Controller<F> {
     fn facts(&self) -> Facts {
         let (own, input) = (self.figure.facts(), self.arguments.input);
-        let mut command = vec![CommandRange::new("velocity", -FASTEST..=FASTEST, "m/s")];
+        let mut command = vec![CommandRange::new("velocity", -MAX_SPEED..=MAX_SPEED, "m/s")];
         if input == Input::Discrete {
             command.push(CommandRange::new("jump", 0.0..=1.0, ""));
         }
@@ -204,8 +210,8 @@ impl<F: Figure> Agent for Controller<F> {
             metrics: names(["forward", "velocity_error"]),
             parts: names(F::PARTS),
             command,
-            memory: self.relive().memory(),
-            termination_reward: Some(-self.arguments.price.0),
+            memory: self.fall_replay().memory(),
+            termination_reward: Some(-self.arguments.fall_penalty.0),
             ..own
         };
         if self.is_opposed() {
@@ -235,9 +241,9 @@ impl<F: Figure> Agent for Controller<F> {
     }
 
     fn reset(&self, start: &mut Start) {
-        let relive = self.relive();
-        relive.carry(start);
-        relive.start(start);
+        let fall_replay = self.fall_replay();
+        fall_replay.carry(start);
+        fall_replay.start(start);
         self.figure.reset(start);
     }
 
@@ -277,7 +283,7 @@ impl<F: Figure> Agent for Controller<F> {
         let rose = memory[ROSE] * memory[TOLD];
         memory[ROSE] = jump * rose.max(rises);
         memory[TOLD] = jump;
-        self.relive().remember(s, memory, |_| {
+        self.fall_replay().remember(s, memory, |_| {
             let felled = self.figure.terminated(s);
             [T::not(felled), felled]
         });
@@ -324,14 +330,14 @@ impl<F: Figure> Agent for Controller<F> {
         terms.add("late", LATE, s.memory(WAITS) * stands * (one - rose * T::lit(RISEN)));
         // commanded to stand, without a jump
         let rest = stands * (one - jump);
-        let [fidgets, stirs] = stillness(s, F::PARTS.len(), RESTLESS);
+        let [fidgets, stirs] = stillness(s, F::PARTS.len(), STILLNESS_SCALES);
         terms.add("still", STILL, rest * (fidgets + stirs));
         terms.add("height", -1.0, F::low(s));
         // the adversary's actions cost the figure no effort
         terms.add("effort", F::EFFORT, s.effort(Motors::from(F::MOTORS)));
         if self.is_opposed() {
             let fallen = self.figure.terminated(s);
-            terms.add("fall", -self.arguments.price.0, T::masked(fallen, one));
+            terms.add("fall", -self.arguments.fall_penalty.0, T::masked(fallen, one));
             commander::add_terms((told - velocity).abs(), fallen, terms);
         }
     }

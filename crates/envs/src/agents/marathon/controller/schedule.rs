@@ -3,7 +3,7 @@
 //!
 //! A command holds for 40 to 239 decisions, uniformly distributed. With `toggle`, it holds for 100.
 
-use super::{FASTEST, Input};
+use super::{Input, MAX_SPEED};
 use crate::agent::options::Choice;
 use crate::episode_rng::EpisodeRng;
 
@@ -51,18 +51,18 @@ impl Schedule {
     pub(super) fn draw(self, input: Input, random: &mut EpisodeRng, step: usize, out: &mut [f64]) -> usize {
         let before = out[0];
         let luck = random.uniform(0.0, 1.0);
-        let side = |luck: f64| if luck < 0.5 { FASTEST } else { -FASTEST };
+        let side = |luck: f64| if luck < 0.5 { MAX_SPEED } else { -MAX_SPEED };
         let moving = before != 0.0 || out.get(1).is_some_and(|jump| *jump > 0.0);
         out[0] = match self {
             Schedule::Repeats if moving && luck < 0.4 => return random.whole(HOLDS[0], HOLDS[1]),
             Schedule::Repeats | Schedule::Anew => match random.uniform(0.0, 1.0) {
-                luck if luck < 0.4 => FASTEST,
-                luck if luck < 0.8 => -FASTEST,
+                luck if luck < 0.4 => MAX_SPEED,
+                luck if luck < 0.8 => -MAX_SPEED,
                 _ => 0.0,
             },
             Schedule::Thirds if before == 0.0 => match luck {
-                luck if luck < 0.45 => FASTEST,
-                luck if luck < 0.9 => -FASTEST,
+                luck if luck < 0.45 => MAX_SPEED,
+                luck if luck < 0.9 => -MAX_SPEED,
                 _ => 0.0,
             },
             Schedule::Thirds => match luck {
@@ -73,7 +73,7 @@ impl Schedule {
             Schedule::Toggle if step == 0 => side(luck),
             Schedule::Toggle => -before,
             Schedule::Uniform if luck < RESTS => 0.0,
-            Schedule::Uniform => random.around_zero(FASTEST),
+            Schedule::Uniform => random.around_zero(MAX_SPEED),
         };
         if input == Input::Discrete {
             let share = match self {

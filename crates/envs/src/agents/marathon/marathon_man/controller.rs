@@ -30,8 +30,8 @@ use super::body::{
 use super::clips::{self, ALL};
 use super::skills::{BACKFLIP, FROM_A_STAND, JUMP, RISEN, SKILLS, SLOTS, Skills, carriage};
 use super::steer::{
-    BEGUN, CLIPS, Commands, DIRECTION, FASTEST, Haste, OBSERVATION, PACE, SHARPEST, Steer, SteerArguments, TARGET,
-    TERMS,
+    CLIPS, Commands, DIRECTION, MAX_SPEED, MAX_TURN, OBSERVATION, PACE, PaceLimits, START_ROW, Steer, SteerArguments,
+    TARGET, TERMS,
 };
 use super::{FRAME_SKIP, SECONDS, decisions};
 use crate::agent::senses::{clamp, hypot};
@@ -43,18 +43,25 @@ use crate::episode_rng::EpisodeRng;
 
 /// Highest commanded speed to a side, m/s.
 const ASIDE: f64 = 0.8;
-/// Rates and limits of the reference signals. They are higher than in the steered task, except for slowing down: a run
+/// Rates and limits of the reference signals. They are higher than in the steered task, except for deceleration down: a run
 /// that ends abruptly makes the character fall.
-const HASTE: Haste =
-    Haste { speeding: 5.0, slowing: 3.0, urging: 0.5, lead: 1.2, quick: true, turning: 0.6, least: 0.8 };
+const PACE_LIMITS: PaceLimits = PaceLimits {
+    acceleration: 5.0,
+    deceleration: 3.0,
+    overshoot: 0.5,
+    max_lead: 1.2,
+    quick_steps: true,
+    turn_radius: 0.6,
+    min_pace: 0.8,
+};
 /// How far ahead the clip is observed, decisions.
 const AHEAD: usize = 4;
 /// The skills' memory slots, after those of the steered task.
-const SKILL: Skills = Skills { slot: BEGUN + 1 };
+const SKILL: Skills = Skills { slot: START_ROW + 1 };
 /// Slot that holds whether a fall ends the episode.
-const MORTAL: usize = SKILL.slot + SLOTS;
-/// Number of slots without those of [replayed falls](super::super::relive).
-const MEMORY: usize = MORTAL + 1;
+const ENDS_ON_FALL: usize = SKILL.slot + SLOTS;
+/// Number of slots without those of [replayed falls](super::super::fall_replay).
+const MEMORY: usize = ENDS_ON_FALL + 1;
 /// Fraction of the episodes that start within a skill.
 const SKILLED: f64 = 0.45;
 /// Mean distance of the parts from the clip that ends an episode without locomotion, m.
@@ -72,13 +79,13 @@ const JUMPING: f64 = 0.15;
 const FLIPPING: f64 = 0.12;
 const STEPPING: f64 = 0.15;
 /// Smallest and largest velocity change by the push at the start of an episode, m/s.
-const KNOCK: [f64; 2] = [2.0, 5.0];
+const PUSH_SPEED: [f64; 2] = [2.0, 5.0];
 
 crate::options! {
     /// Arguments of Marathon Man under a player's control.
     pub struct ControllerArguments {
         /// Largest offset of a servo's target by an action, rad.
-        reach: Scale = Scale(1.0),
+        action_scale: Scale = Scale(1.0),
         /// Start of an episode: `random` decisions of the clips and skills, `first` (standing), or `adaptive` (as in
         /// the steered task).
         start: StartAt = StartAt::Random,
@@ -89,15 +96,15 @@ crate::options! {
         clip: Clips = Clips::named(ALL),
         /// Fraction of training episodes that end at a fall instead of waiting until the character is up (0 to 1).
         /// Episodes that start lying never do.
-        mortal: Share = Share(0.0),
+        end_on_fall_prob: Share = Share(0.0),
         /// Fraction of the locomotion episodes that start with a push that makes the character fall (0 to 1). These
         /// episodes continue after falls, so the policy sees how falls end.
-        knocked: Share = Share(0.0),
+        start_pushed_prob: Share = Share(0.0),
         /// Penalty of a failure that ends the episode.
-        price: Scale = Scale(0.0),
+        fall_penalty: Scale = Scale(0.0),
         /// Fraction of the locomotion episodes that start 0.75 to 1.5 s before the last fall, once there is one (0 to
         /// 1).
-        relive: Share = Share(0.0),
+        replay_falls_prob: Share = Share(0.0),
     }
 }
 
@@ -142,8 +149,11 @@ impl Controller {
         let all = clips::is_all(&arguments.clip);
         let named = |name: &str| all || arguments.clip.iter().any(|clip| clip.name() == name);
         let does = Does { gait: CLIPS.into_iter().any(named), skills: SKILLS.map(|skill| named(skill.clip)) };
-        let ControllerArguments { reach, start, commands, relive, .. } = arguments;
-        let steer = Steer::of(SteerArguments { reach, start, commands, relive, ..SteerArguments::default() }, MEMORY);
+        let ControllerArguments { action_scale, start, commands, replay_falls_prob, .. } = arguments;
+        let steer = Steer::of(
+            SteerArguments { action_scale, start, commands, replay_falls_prob, ..SteerArguments::default() },
+            MEMORY,
+        );
         Controller { arguments, does, steer }
     }
 }
@@ -167,16 +177,16 @@ impl Agent for Controller {
             touch_sites: names(TOUCH),
             feet: names(FEET.map(|part| PARTS[part.0])),
             command: vec![
-                CommandRange::new("speed", 0.0..=FASTEST, "m/s"),
+                CommandRange::new("speed", 0.0..=MAX_SPEED, "m/s"),
                 CommandRange::new("left", -ASIDE..=ASIDE, "m/s"),
-                CommandRange::new("turn", -SHARPEST..=SHARPEST, "rad/s"),
+                CommandRange::new("turn", -MAX_TURN..=MAX_TURN, "rad/s"),
                 CommandRange::new("jump", 0.0..=1.0, ""),
                 CommandRange::new("backflip", 0.0..=1.0, ""),
             ],
             clips: known_clips().into_iter().filter_map(clips::shipped).collect(),
             follows_clips: false,
-            memory: self.steer.relive.memory(),
-            termination_reward: (self.arguments.price.0 > 0.0).then_some(-self.arguments.price.0),
+            memory: self.steer.fall_replay.memory(),
+            termination_reward: (self.arguments.fall_penalty.0 > 0.0).then_some(-self.arguments.fall_penalty.0),
             ..Facts::default()
         }
     }
@@ -198,28 +208,28 @@ impl Agent for Controller {
         let Does { gait, skills } = self.does;
         let known: Vec<usize> = (0..SKILLS.len()).filter(|i| skills[*i]).collect();
         let first = self.arguments.start == StartAt::First;
-        let mortal = f64::from(u8::from(start.random.uniform(0.0, 1.0) < self.arguments.mortal.0));
+        let ends_on_fall = f64::from(u8::from(start.random.uniform(0.0, 1.0) < self.arguments.end_on_fall_prob.0));
         if gait && (first || known.is_empty() || start.random.uniform(0.0, 1.0) >= SKILLED) {
             self.steer.reset(start);
-            start.memory[MORTAL] = mortal;
-            if start.random.uniform(0.0, 1.0) < self.arguments.knocked.0 {
+            start.memory[ENDS_ON_FALL] = ends_on_fall;
+            if start.random.uniform(0.0, 1.0) < self.arguments.start_pushed_prob.0 {
                 let angle = start.random.around_zero(PI);
-                let speed = start.random.uniform(KNOCK[0], KNOCK[1]);
+                let speed = start.random.uniform(PUSH_SPEED[0], PUSH_SPEED[1]);
                 start.qvel[0] += speed * libm::cos(angle);
                 start.qvel[1] += speed * libm::sin(angle);
-                start.memory[MORTAL] = 0.0;
+                start.memory[ENDS_ON_FALL] = 0.0;
             }
             return;
         }
-        self.steer.relive.carry(start);
+        self.steer.fall_replay.carry(start);
         let skill = known[start.random.whole(0, known.len() - 1)];
         let rows = start.clips().nth(CLIPS.len() + skill).expect("a row of clips for each clip");
         let [first, last] = SKILLS[skill].rows.map(|row| (rows.start + row).min(rows.end - 1));
         let row = if self.arguments.start == StartAt::First { first } else { start.random.whole(first, last - 1) };
         start.start_in_clip(row);
         start.memory[SKILL.slot] = (1 + skill) as f64;
-        start.memory[BEGUN] = 0.0;
-        start.memory[MORTAL] = if skill < FROM_A_STAND { mortal } else { 0.0 };
+        start.memory[START_ROW] = 0.0;
+        start.memory[ENDS_ON_FALL] = if skill < FROM_A_STAND { ends_on_fall } else { 0.0 };
         start.add_noise(ResetNoise::MARATHON);
     }
 
@@ -245,16 +255,16 @@ impl Agent for Controller {
 
     #[inline(always)]
     fn ctrl<T: Real>(&self, c: &mut Ctrl<T>) {
-        let reach = T::lit(self.arguments.reach.0);
+        let action_scale = T::lit(self.arguments.action_scale.0);
         let (on, clip) = (SKILL.on(c.memory), c.reference(1));
-        let gait = Steer::next_pose(|slot| c.memory[slot], HASTE, c.dt, DAMPING_TIME);
+        let gait = Steer::next_pose(|slot| c.memory[slot], PACE_LIMITS, c.dt, DAMPING_TIME);
         let mut targets = [T::zero(); JOINTS.len()];
         for (joint, target) in targets.iter_mut().enumerate() {
             let of_clip = clip.qvel(FIRST_QVEL + joint).mul_add(T::lit(DAMPING_TIME), clip.qpos(FIRST_QPOS + joint));
             *target = T::select(on, of_clip, gait(joint));
         }
         for (i, joint) in ACTIONS.into_iter().enumerate() {
-            c.ctrl[i] = c.action[i].mul_add(reach, targets[joint]);
+            c.ctrl[i] = c.action[i].mul_add(action_scale, targets[joint]);
         }
     }
 
@@ -272,7 +282,7 @@ impl Agent for Controller {
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         let [speed, left, turn, jump, backflip] = told(s);
         let before = [DIRECTION, DIRECTION + 1].map(|slot| memory[slot]);
-        Steer::lead(s, memory, [speed, left], turn, HASTE);
+        Steer::lead(s, memory, [speed, left], turn, PACE_LIMITS);
         let rose = SKILL.rises(memory);
         let was_on = SKILL.remember(s, memory, [jump, backflip]);
         let on = SKILL.on(memory);
@@ -286,8 +296,8 @@ impl Agent for Controller {
             memory[DIRECTION + i] = T::select(risen, heading[i], kept);
             memory[TARGET + i] = T::select(led, memory[TARGET + i], [x, y][i]);
         }
-        memory[PACE] = T::select(on, hypot(x, y).min(T::lit(FASTEST)), memory[PACE]);
-        self.steer.relive.remember(s, memory, |memory| {
+        memory[PACE] = T::select(on, hypot(x, y).min(T::lit(MAX_SPEED)), memory[PACE]);
+        self.steer.fall_replay.remember(s, memory, |memory| {
             let felled = T::and(SKILL.rises(memory), T::not(rose));
             [T::not(T::or(on, SKILL.leaps(memory))), felled]
         });
@@ -301,7 +311,7 @@ impl Agent for Controller {
         let (turned, next, r) = (turned_to(facing), s.reference(1), s.readings());
         let pose = |i, of_gait| T::select(on, next.qpos(FIRST_QPOS + i), of_gait);
         let [speed, left, turn, jump, backflip] = told(s);
-        Steer::observe_going(s, facing, [speed, turn], pose, HASTE, out);
+        Steer::observe_going(s, facing, [speed, turn], pose, PACE_LIMITS, out);
         out.group("phase");
         for x in s.reference(0).phase_angles() {
             out.scalar(T::masked(on, x));
@@ -360,9 +370,11 @@ impl Agent for Controller {
         let rises = SKILL.rises(&all);
         let mut over = SKILL.stuck(&all);
         // getting up began in this decision, so the character just fell
-        let mortal =
-            T::or(T::lit(0.5).lt(s.memory(MORTAL)), if self.does.rises() { T::none() } else { T::not(T::none()) });
-        over = T::or(over, T::and(mortal, T::and(rises, T::not(T::lit(0.5).lt(s.memory(SKILL.slot + 1))))));
+        let ends_on_fall = T::or(
+            T::lit(0.5).lt(s.memory(ENDS_ON_FALL)),
+            if self.does.rises() { T::none() } else { T::not(T::none()) },
+        );
+        over = T::or(over, T::and(ends_on_fall, T::and(rises, T::not(T::lit(0.5).lt(s.memory(SKILL.slot + 1))))));
         if !self.does.gait {
             let far = T::lit(TOO_FAR).lt(imitation::distance(s, &ANATOMY, true));
             over = T::or(over, T::and(SKILL.on(&all), far));

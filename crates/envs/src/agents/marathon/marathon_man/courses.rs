@@ -5,7 +5,7 @@ use marathon_physics::lanes::Real;
 
 use super::super::terrain::{Runner, Terrain};
 use super::body::{ACTIONS, BUTT, FEET, JOINTS};
-use super::steer::{BEGUN, DIRECTION, FASTEST, HOLDS, OBSERVED, Steer, TERMS};
+use super::steer::{DIRECTION, HOLDS, MAX_SPEED, OBSERVED, START_ROW, Steer, TERMS};
 use crate::agent::{Agent, Obs, Part, Senses, Start, Terms};
 use crate::episode_rng::EpisodeRng;
 
@@ -25,7 +25,7 @@ impl Runner for Steer {
     const SOLES: &'static [Part] = &FEET;
     const FALL: f64 = -20.0;
     const TERMS: &'static [&'static str] = &TERMS;
-    const MEMORY: usize = BEGUN + 1;
+    const MEMORY: usize = START_ROW + 1;
     const IN_SPACE: bool = true;
     const BODY: &'static [&'static str] = &OBSERVED;
     const MOTORS: usize = ACTIONS.len();
@@ -56,7 +56,7 @@ impl Runner for Steer {
     }
 
     fn tell(&self, random: &mut EpisodeRng, _: usize, out: &mut [f64]) -> usize {
-        out.copy_from_slice(&[random.uniform(SLOWEST, FASTEST), 0.0]);
+        out.copy_from_slice(&[random.uniform(SLOWEST, MAX_SPEED), 0.0]);
         random.whole(HOLDS[0], HOLDS[1])
     }
 

@@ -84,7 +84,7 @@ crate::options! {
         /// pose.
         sharpness: Scale = Scale(1.0),
         /// Largest offset of a servo's target by an action of `pd`, rad.
-        reach: Scale = Scale(1.0),
+        action_scale: Scale = Scale(1.0),
         /// Number of later clip frames in the observation, 0 to 3: 4, 8 and 16 decisions ahead.
         future: usize = 0,
         /// Longest episode, s. With several clips, shorter episodes give mastered clips a smaller part of the training.
@@ -210,13 +210,13 @@ impl Agent for MarathonMan {
         match self.arguments.control {
             Control::PdRange | Control::Torque | Control::Servo => c.ctrl.copy_from_slice(c.action),
             Control::Pd => {
-                let reach = T::lit(self.arguments.reach.0);
+                let action_scale = T::lit(self.arguments.action_scale.0);
                 for (i, joint) in ACTIONS.into_iter().enumerate() {
                     let clip = c.reference(1);
                     // compensate the servo's damping, which would slow the clip's motion
                     let target =
                         clip.qvel(FIRST_QVEL + joint).mul_add(T::lit(DAMPING_TIME), clip.qpos(FIRST_QPOS + joint));
-                    c.ctrl[i] = c.action[i].mul_add(reach, target);
+                    c.ctrl[i] = c.action[i].mul_add(action_scale, target);
                 }
             }
         }

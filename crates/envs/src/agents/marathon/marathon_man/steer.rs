@@ -21,7 +21,7 @@
 //!
 //! A command passes through three reference signals, updated once per decision by `Steer::lead`:
 //!
-//! 1. The *commanded direction* turns at the commanded rate. It stays within [`MOST_BEHIND`] of the heading, so it
+//! 1. The *commanded direction* turns at the commanded rate. It stays within [`MAX_HEADING_LAG`] of the heading, so it
 //!    waits for a character that cannot follow.
 //! 2. The *target velocity* moves toward the commanded velocity with a limited acceleration.
 //! 3. The *pace* is the speed for which the [gait](super::gait) is generated. It follows the target speed and stays
@@ -41,9 +41,9 @@ use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
 use super::super::controller::stillness;
+use super::super::fall_replay::FallReplay;
 use super::super::heading;
 use super::super::imitation::{EARLY, StartAt, observe_body, sub, turned_to};
-use super::super::relive::Relive;
 use super::body::{
     ACTIONS, ANATOMY, BUTT, Control, DAMPING_TIME, END_EFFECTORS, FEET, FIRST_QPOS, JOINTS, PARTS, TOUCH, model, parts,
 };
@@ -84,11 +84,11 @@ const STANDS: usize = 4;
 /// Size of the observation.
 pub(super) const OBSERVATION: usize = 82 + JOINTS.len();
 /// Highest commanded speed, m/s.
-pub(super) const FASTEST: f64 = 3.0;
+pub(super) const MAX_SPEED: f64 = 3.0;
 /// Highest commanded turn rate, rad/s.
-pub(super) const SHARPEST: f64 = FRAC_PI_2;
+pub(super) const MAX_TURN: f64 = FRAC_PI_2;
 /// Largest angle between the commanded direction and the heading, rad.
-pub const MOST_BEHIND: f64 = 1.0;
+pub const MAX_HEADING_LAG: f64 = 1.0;
 /// Shortest and longest duration of a command, decisions.
 pub(super) const HOLDS: [usize; 2] = [40, 240];
 /// Fraction of `sharp` commands that are to stand, and their shortest and longest duration, decisions. After a stop
@@ -111,61 +111,68 @@ pub(super) const PHASE: usize = TARGET + 2;
 /// Slot of the pace, the speed for which the gait is generated, m/s.
 pub(super) const PACE: usize = PHASE + 1;
 /// Slot that counts the episode's decisions.
-const MADE: usize = PACE + 1;
+const DECISIONS: usize = PACE + 1;
 /// Slot of the clip row in which the episode started.
-pub(super) const BEGUN: usize = MADE + 1;
+pub(super) const START_ROW: usize = DECISIONS + 1;
 /// Rates and limits of the steered task.
-const HASTE: Haste =
-    Haste { speeding: 4.0, slowing: 4.0, urging: 0.0, lead: 0.8, quick: false, turning: 0.4, least: 0.0 };
+const PACE_LIMITS: PaceLimits = PaceLimits {
+    acceleration: 4.0,
+    deceleration: 4.0,
+    overshoot: 0.0,
+    max_lead: 0.8,
+    quick_steps: false,
+    turn_radius: 0.4,
+    min_pace: 0.0,
+};
 /// The deceleration limit applies when the command is slower than the target by more than this, m/s. Turning changes
 /// the target velocity too.
-const SLOWER: f64 = 0.3;
+const SLOWING_MARGIN: f64 = 0.3;
 /// Largest lateral acceleration of the target in a turn, m/s^2. It caps the target speed in sharp turns.
-const SIDEWAYS: f64 = 2.5;
+const MAX_TURN_ACCELERATION: f64 = 2.5;
 /// Largest lateral acceleration that a turning commanded direction implies at the body's own speed, m/s^2. It slows the
 /// turn down while the body is still too fast.
-const LEANING: f64 = 3.0;
+const MAX_HEADING_ACCELERATION: f64 = 3.0;
 /// Mean squares of the parts' velocities at which the two halves of the `still` term drop to 1/e, m^2/s^2. The first
 /// half rewards coming to rest, the second rewards keeping still.
-const RESTLESS: [f64; 2] = [0.1, 0.01];
+const STILLNESS_SCALES: [f64; 2] = [0.1, 0.01];
 /// Largest overshoot of the target beyond the command, m/s.
-const URGED: f64 = 0.5;
+const MAX_OVERSHOOT: f64 = 0.5;
 /// Smallest command that is overshot, m/s.
-const URGES: f64 = 0.05;
+const MIN_OVERSHOT_COMMAND: f64 = 0.05;
 /// Upper limit of the least pace, as a multiple of the commanded velocity. The least pace fades out with small
 /// commands.
-const LEAST_OF_TOLD: f64 = 4.0;
+const MIN_PACE_PER_COMMAND: f64 = 4.0;
 
 /// Rates and limits of the reference signals: target velocity, pace and gait.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Haste {
+pub(super) struct PaceLimits {
     /// Largest rate of change of the target velocity and the pace, m/s^2.
-    pub speeding: f64,
-    /// The same while slowing down, m/s^2.
-    pub slowing: f64,
-    /// Overshoot of the target beyond a command to move, as a fraction of the velocity error. It is at most [`URGED`],
-    /// and the target never exceeds [`FASTEST`]. Without it, the body gets close to a command quickly and takes as long
+    pub acceleration: f64,
+    /// The same while deceleration down, m/s^2.
+    pub deceleration: f64,
+    /// Overshoot of the target beyond a command to move, as a fraction of the velocity error. It is at most [`MAX_OVERSHOOT`],
+    /// and the target never exceeds [`MAX_SPEED`]. Without it, the body gets close to a command quickly and takes as long
     /// again for the rest.
-    pub urging: f64,
+    pub overshoot: f64,
     /// Largest difference between the pace and the body's speed, m/s. A standing body must not be driven by a running
     /// gait.
-    pub lead: f64,
+    pub max_lead: f64,
     /// Whether the gait cycles at the rate of the target speed if that exceeds the pace. The character then starts with
     /// short, quick steps.
-    pub quick: bool,
+    pub quick_steps: bool,
     /// Pace of a turn on the spot, given as the radius of a circle that is walked at the same turn rate, m.
-    pub turning: f64,
+    pub turn_radius: f64,
     /// Least pace under a command to move or turn, m/s. A slower gait hardly lifts the feet, and the character
     /// stumbles.
-    pub least: f64,
+    pub min_pace: f64,
 }
 
-impl Haste {
+impl PaceLimits {
     /// The speed whose step frequency the gait uses, m/s.
     #[inline(always)]
     pub fn cadence<T: Real>(self, memory: impl Fn(usize) -> T) -> T {
         let pace = memory(PACE);
-        if self.quick { pace.max(hypot(memory(TARGET), memory(TARGET + 1))) } else { pace }
+        if self.quick_steps { pace.max(hypot(memory(TARGET), memory(TARGET + 1))) } else { pace }
     }
 }
 
@@ -191,7 +198,7 @@ crate::options! {
         /// of the original's drive.
         control: Control = Control::Pd,
         /// Largest offset of a servo's target by an action of `pd`, rad.
-        reach: Scale = Scale(1.0),
+        action_scale: Scale = Scale(1.0),
         /// Start of an episode: `random` decisions of the clips, `first` (standing), or `adaptive`. With `adaptive`,
         /// half of the episodes after an early failure start where the failed one did. Half of the others start in a
         /// clip that fits the command.
@@ -199,10 +206,10 @@ crate::options! {
         /// Commands that are drawn when no caller sets them: `even` (uniform), or `sharp` (half of them extreme).
         commands: Commands = Commands::Even,
         /// Penalty of a fall.
-        price: Scale = Scale(0.0),
+        fall_penalty: Scale = Scale(0.0),
         /// Fraction of training episodes that start 0.75 to 1.5 s before the last fall, once there is one. They let the
         /// policy practice what made it fall.
-        relive: Share = Share(0.0),
+        replay_falls_prob: Share = Share(0.0),
         /// Longest episode, s. With shorter episodes, more of them follow a fall.
         seconds: Seconds = Seconds(SECONDS),
     }
@@ -231,26 +238,26 @@ fn fitting_clip(command: &[f64]) -> usize {
 #[derive(Clone, Debug)]
 pub struct Steer {
     pub(super) arguments: SteerArguments,
-    pub(super) relive: Relive,
+    pub(super) fall_replay: FallReplay,
 }
 
 impl Default for Steer {
     fn default() -> Self {
-        Self::of(SteerArguments::default(), BEGUN + 1)
+        Self::of(SteerArguments::default(), START_ROW + 1)
     }
 }
 
 impl Steer {
     /// `relived`: the first memory slot of the replayed falls.
     pub(super) fn of(arguments: SteerArguments, relived: usize) -> Self {
-        let relive = Relive {
+        let fall_replay = FallReplay {
             slot: relived,
-            share: arguments.relive.0,
+            share: arguments.replay_falls_prob.0,
             joints: [FIRST_QPOS, FIRST_QPOS - 1].map(|first| first + JOINTS.len()),
             places: 2,
             also: Some(PHASE),
         };
-        Steer { arguments, relive }
+        Steer { arguments, fall_replay }
     }
 
     /// Angle from the heading to a direction, rad.
@@ -302,42 +309,42 @@ impl Steer {
     /// Advances the commanded direction, the target velocity and the gait by one decision. The command is a velocity
     /// ahead and to the left, and a turn rate.
     #[inline(always)]
-    pub(super) fn lead<T: Real>(s: &Senses<T>, memory: &mut [T], [told, left]: [T; 2], turn: T, haste: Haste) {
+    pub(super) fn lead<T: Real>(s: &Senses<T>, memory: &mut [T], [told, left]: [T; 2], turn: T, limits: PaceLimits) {
         let speed = Self::speed(s);
         // limit the turn rate to what a body of this speed can follow
-        let sharpest = T::lit(LEANING).div(speed.max(T::lit(LEANING / SHARPEST)));
+        let sharpest = T::lit(MAX_HEADING_ACCELERATION).div(speed.max(T::lit(MAX_HEADING_ACCELERATION / MAX_TURN)));
         let led = turn.max(-sharpest).min(sharpest);
         let by = |angle: T| led.mul_add(T::lit(s.dt()), angle);
         let direction = [memory[DIRECTION], memory[DIRECTION + 1]];
-        let direction = heading::turned(s.heading(BUTT), direction, by, MOST_BEHIND);
+        let direction = heading::turned(s.heading(BUTT), direction, by, MAX_HEADING_LAG);
         memory[DIRECTION..DIRECTION + 2].copy_from_slice(&direction);
-        memory[PHASE] = Self::next_phase(memory[PHASE], haste.cadence(|slot| memory[slot]), s.dt());
-        memory[MADE] += T::lit(1.0);
+        memory[PHASE] = Self::next_phase(memory[PHASE], limits.cadence(|slot| memory[slot]), s.dt());
+        memory[DECISIONS] += T::lit(1.0);
         // limit the target's acceleration, and its speed in sharp turns
-        let [speeding, slowing] = [haste.speeding, haste.slowing].map(|rate| T::lit(rate * s.dt()));
-        let sharpest = T::lit(SIDEWAYS).div(turn.abs().max(T::lit(SIDEWAYS / FASTEST)));
+        let [acceleration, deceleration] = [limits.acceleration, limits.deceleration].map(|rate| T::lit(rate * s.dt()));
+        let sharpest = T::lit(MAX_TURN_ACCELERATION).div(turn.abs().max(T::lit(MAX_TURN_ACCELERATION / MAX_SPEED)));
         let told = told.min(sharpest);
-        let slows = told.lt(hypot(memory[TARGET], memory[TARGET + 1]) - T::lit(SLOWER));
-        let most = T::select(slows, slowing, speeding);
+        let slows = told.lt(hypot(memory[TARGET], memory[TARGET + 1]) - T::lit(SLOWING_MARGIN));
+        let most = T::select(slows, deceleration, acceleration);
         let beside = [-(left * direction[1]), left * direction[0]];
         let short_of_told = |i: usize, velocity: T| told.mul_add(direction[i], -velocity) + beside[i];
         let [x, y, _] = s.center_of_mass_velocity();
         let lacks = [short_of_told(0, x), short_of_told(1, y)];
-        // cap the overshoot at `FASTEST`; a stop command has none
+        // cap the overshoot at `MAX_SPEED`; a stop command has none
         let asked = hypot(told, left);
-        let most_urged = clamp(T::lit(FASTEST) - asked, 1e-6, URGED);
-        let urging = T::masked(T::lit(URGES).lt(asked), T::lit(haste.urging));
-        let urging = urging * most_urged.div((hypot(lacks[0], lacks[1]) * urging).max(most_urged));
-        let missing = [0, 1].map(|i| lacks[i].mul_add(urging, short_of_told(i, memory[TARGET + i])));
+        let most_urged = clamp(T::lit(MAX_SPEED) - asked, 1e-6, MAX_OVERSHOOT);
+        let overshoot = T::masked(T::lit(MIN_OVERSHOT_COMMAND).lt(asked), T::lit(limits.overshoot));
+        let overshoot = overshoot * most_urged.div((hypot(lacks[0], lacks[1]) * overshoot).max(most_urged));
+        let missing = [0, 1].map(|i| lacks[i].mul_add(overshoot, short_of_told(i, memory[TARGET + i])));
         let share = most.div(hypot(missing[0], missing[1]).max(most));
         for i in 0..2 {
             memory[TARGET + i] = missing[i].mul_add(share, memory[TARGET + i]);
         }
-        let turning = turn.abs() * T::lit(haste.turning);
-        let least = (asked.max(turning) * T::lit(LEAST_OF_TOLD)).min(T::lit(haste.least));
+        let turning = turn.abs() * T::lit(limits.turn_radius);
+        let least = (asked.max(turning) * T::lit(MIN_PACE_PER_COMMAND)).min(T::lit(limits.min_pace));
         let pace = hypot(memory[TARGET], memory[TARGET + 1]).max(turning).max(least);
-        let pace = speed + clamp(pace - speed, -haste.lead, haste.lead);
-        memory[PACE] += (pace - memory[PACE]).max(-slowing).min(speeding);
+        let pace = speed + clamp(pace - speed, -limits.max_lead, limits.max_lead);
+        memory[PACE] += (pace - memory[PACE]).max(-deceleration).min(acceleration);
     }
 
     /// Adds the reward's terms. `moves` masks the lanes of `velocity` and `pace`, `holds` those of `drift`, and `goes`
@@ -355,20 +362,20 @@ impl Steer {
         add("gait", 0.2, goes, pose * T::lit(-5.0));
         add("tempo", 0.05, goes, tempo * T::lit(-1.0));
         let rest = T::and(goes, told.lt(T::lit(0.01)));
-        let [shuffles, stirs] = stillness(s, PARTS.len(), RESTLESS);
+        let [shuffles, stirs] = stillness(s, PARTS.len(), STILLNESS_SCALES);
         terms.add("still", 0.3, T::masked(rest, shuffles + stirs));
     }
 
     /// Writes the observation of the command, the body and the reference signals. Vectors are expressed in the
     /// direction `facing`. `told` is the commanded speed and turn rate. `next` maps a hinge and its next angle in the
-    /// gait to the angle to observe. `haste` holds the limits of the reference signals.
+    /// gait to the angle to observe. `limits` holds the limits of the reference signals.
     #[inline(always)]
     pub(super) fn observe_going<T: Real>(
         s: &Senses<T>,
         facing: [T; 2],
         told: [T; 2],
         next: impl Fn(usize, T) -> T,
-        haste: Haste,
+        limits: PaceLimits,
         out: &mut Obs<T>,
     ) {
         let turned = turned_to(facing);
@@ -394,7 +401,7 @@ impl Steer {
         for x in [pace, cos, sin] {
             out.scalar(x);
         }
-        let gait = Self::next_pose(|slot| s.memory(slot), haste, s.dt(), 0.0);
+        let gait = Self::next_pose(|slot| s.memory(slot), limits, s.dt(), 0.0);
         out.group("next_pose");
         for i in 0..JOINTS.len() {
             out.scalar(next(i, gait(i)) - s.readings().qpos(FIRST_QPOS + i));
@@ -411,20 +418,20 @@ impl Steer {
     #[inline(always)]
     pub(super) fn observe_along<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
         let told = [s.command(0), s.command(1)];
-        Self::observe_going(s, s.heading(BUTT), told, |_, of_gait| of_gait, HASTE, out);
+        Self::observe_going(s, s.heading(BUTT), told, |_, of_gait| of_gait, PACE_LIMITS, out);
     }
 
     /// Angles of the gait's next pose, shifted by `lead` seconds at their velocities.
     #[inline(always)]
     pub(super) fn next_pose<T: Real>(
         memory: impl Fn(usize) -> T,
-        haste: Haste,
+        limits: PaceLimits,
         dt: f64,
         lead: f64,
     ) -> impl Fn(usize) -> T {
         let gaits = gaits();
         let (phase, pace) = (memory(PHASE), memory(PACE));
-        let next = gaits.moment(Self::next_phase(phase, haste.cadence(memory), dt), pace, lead);
+        let next = gaits.moment(Self::next_phase(phase, limits.cadence(memory), dt), pace, lead);
         move |joint| gaits.angle(&next, joint)
     }
 
@@ -452,13 +459,13 @@ impl Agent for Steer {
             parts: names(PARTS),
             touch_sites: names(TOUCH),
             command: vec![
-                CommandRange::new("speed", 0.0..=FASTEST, "m/s"),
-                CommandRange::new("turn", -SHARPEST..=SHARPEST, "rad/s"),
+                CommandRange::new("speed", 0.0..=MAX_SPEED, "m/s"),
+                CommandRange::new("turn", -MAX_TURN..=MAX_TURN, "rad/s"),
             ],
             clips: CLIPS.into_iter().filter_map(clips::shipped).collect(),
             follows_clips: false,
-            memory: self.relive.memory(),
-            termination_reward: (self.arguments.price.0 > 0.0).then_some(-self.arguments.price.0),
+            memory: self.fall_replay.memory(),
+            termination_reward: (self.arguments.fall_penalty.0 > 0.0).then_some(-self.arguments.fall_penalty.0),
             ..Facts::default()
         }
     }
@@ -468,7 +475,7 @@ impl Agent for Steer {
     }
 
     fn with_options(&self, options: &Options) -> Option<Self> {
-        Some(Self::of(self.arguments.with(options), self.relive.slot))
+        Some(Self::of(self.arguments.with(options), self.fall_replay.slot))
     }
 
     fn fits(&self, model: &Model) -> Result<(), String> {
@@ -476,9 +483,9 @@ impl Agent for Steer {
     }
 
     fn reset(&self, start: &mut Start) {
-        self.relive.carry(start);
+        self.fall_replay.carry(start);
         let adaptive = self.arguments.start == StartAt::Adaptive;
-        let [made, begun] = [MADE, BEGUN].map(|slot| start.previous[slot]);
+        let [made, begun] = [DECISIONS, START_ROW].map(|slot| start.previous[slot]);
         let early = made > 0.0 && made * DECISION < EARLY;
         let row = if adaptive && early && start.random.whole(0, 1) == 0 {
             begun as usize
@@ -495,8 +502,8 @@ impl Agent for Steer {
         let clip = start.clips().position(|rows| rows.contains(&row)).expect("the row is a clip's");
         start.start_in_clip(row);
         start.memory[PHASE] = (start.phase(row) - beginnings()[clip]).rem_euclid(1.0);
-        start.memory[BEGUN] = row as f64;
-        self.relive.start(start);
+        start.memory[START_ROW] = row as f64;
+        self.fall_replay.start(start);
         start.add_noise(ResetNoise::MARATHON);
     }
 
@@ -507,12 +514,12 @@ impl Agent for Steer {
             return random.whole(RESTS[0], RESTS[1]);
         }
         if sharp && random.whole(0, 1) == 0 {
-            out[0] = [0.0, FASTEST, random.uniform(EXTREME * FASTEST, FASTEST)][random.whole(0, 2)];
-            out[1] = [0.0, SHARPEST, -SHARPEST, random.around_zero(SHARPEST)][random.whole(0, 3)];
+            out[0] = [0.0, MAX_SPEED, random.uniform(EXTREME * MAX_SPEED, MAX_SPEED)][random.whole(0, 2)];
+            out[1] = [0.0, MAX_TURN, -MAX_TURN, random.around_zero(MAX_TURN)][random.whole(0, 3)];
             return random.whole(HOLDS[0], HOLDS[1] / 2);
         }
-        out[0] = if random.uniform(0.0, 1.0) < STANDING { 0.0 } else { random.uniform(0.0, FASTEST) };
-        out[1] = if random.uniform(0.0, 1.0) < STRAIGHT { 0.0 } else { random.around_zero(SHARPEST) };
+        out[0] = if random.uniform(0.0, 1.0) < STANDING { 0.0 } else { random.uniform(0.0, MAX_SPEED) };
+        out[1] = if random.uniform(0.0, 1.0) < STRAIGHT { 0.0 } else { random.around_zero(MAX_TURN) };
         random.whole(HOLDS[0], HOLDS[1])
     }
 
@@ -521,11 +528,11 @@ impl Agent for Steer {
         match self.arguments.control {
             Control::PdRange | Control::Torque | Control::Servo => c.ctrl.copy_from_slice(c.action),
             Control::Pd => {
-                let reach = T::lit(self.arguments.reach.0);
+                let action_scale = T::lit(self.arguments.action_scale.0);
                 // compensate the servo's damping, which would slow the gait
-                let next = Self::next_pose(|slot| c.memory[slot], HASTE, c.dt, DAMPING_TIME);
+                let next = Self::next_pose(|slot| c.memory[slot], PACE_LIMITS, c.dt, DAMPING_TIME);
                 for (i, joint) in ACTIONS.into_iter().enumerate() {
-                    c.ctrl[i] = c.action[i].mul_add(reach, next(joint));
+                    c.ctrl[i] = c.action[i].mul_add(action_scale, next(joint));
                 }
             }
         }
@@ -536,13 +543,13 @@ impl Agent for Steer {
         memory[DIRECTION..DIRECTION + 2].copy_from_slice(&s.heading(BUTT));
         let [x, y, _] = s.center_of_mass_velocity();
         memory[TARGET..TARGET + 2].copy_from_slice(&[x, y]);
-        memory[PACE] = hypot(x, y).min(T::lit(FASTEST));
+        memory[PACE] = hypot(x, y).min(T::lit(MAX_SPEED));
     }
 
     #[inline(always)]
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
-        Self::lead(s, memory, [s.command(0), T::zero()], s.command(1), HASTE);
-        self.relive.remember(s, memory, |_| {
+        Self::lead(s, memory, [s.command(0), T::zero()], s.command(1), PACE_LIMITS);
+        self.fall_replay.remember(s, memory, |_| {
             let felled = on_the_ground(s);
             [T::not(felled), felled]
         });

@@ -240,13 +240,13 @@ impl<F: Runner> Agent for Terrain<F> {
             Reward::Velocity => names(["velocity"]),
             Reward::Sparse => names(["distance"]),
         };
-        let (mut actions, mut roles, mut price) = (own.actions.clone(), Vec::new(), None);
+        let (mut actions, mut roles, mut fall_penalty) = (own.actions.clone(), Vec::new(), None);
         let mut max_episode_steps = own.max_episode_steps;
         if reward == Reward::Full {
-            price = Some(F::FALL);
+            fall_penalty = Some(F::FALL);
         }
         if self.built() {
-            if price.take().is_some() {
+            if fall_penalty.take().is_some() {
                 terms.push("fall".into());
             }
             let ahead: &[&str] = match (self.arguments.heights, F::IN_SPACE) {
@@ -275,7 +275,7 @@ impl<F: Runner> Agent for Terrain<F> {
             metrics: names(["forward", "difficulty"]),
             memory: F::MEMORY + if self.regrets() { regret::MEMORY } else { MEMORY },
             max_episode_steps,
-            termination_reward: price,
+            termination_reward: fall_penalty,
             ..own
         }
     }

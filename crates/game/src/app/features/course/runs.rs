@@ -176,7 +176,7 @@ fn follow(
         for sample in history.iter().filter(|sample| until.is_none_or(|until| sample.time > until)) {
             if sample.fresh {
                 let place = track.translation.to_array().to_vec();
-                let recording = Recording::new(loaded.setting.clone(), loaded.ground, anatomy.dt, place);
+                let recording = Recording::new(loaded.task_config.clone(), loaded.ground, anatomy.dt, place);
                 let begun = UnderWay {
                     ragdoll: entity,
                     recording,
@@ -232,7 +232,7 @@ fn follow(
 
 /// Arguments of the task, as on a command line.
 fn arguments(loaded: &LoadedPolicy) -> String {
-    let all = loaded.setting.options.iter().map(|(name, value)| match value {
+    let all = loaded.task_config.options.iter().map(|(name, value)| match value {
         Value::Text(text) => format!("{name}={text}"),
         Value::Clips(clips) => format!("{name}={clips}"),
         other => format!("{name}={other}"),

@@ -5,7 +5,7 @@ use crate::app::features::remote::mailbox::{RemotePose, RemoteSource, Shared, op
 use crate::app::stage::puppets::Kind;
 use bevy_marathon::Episode;
 use marathon_mlagents::{Behavior, BehaviorOptions, Log, Player, PlayerOptions, Turn};
-use marathon_runs::Setting;
+use marathon_runs::TaskConfig;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -16,9 +16,9 @@ const SHOWN: usize = 16;
 ///
 /// # Errors
 /// If there is no trainer, or the agent does not exist.
-pub fn serve(setting: &Setting, agents: usize, port: u16, threads: usize) -> Result<RemoteSource, GameError> {
-    let options = setting.options.clone();
-    let behavior = BehaviorOptions { env: setting.agent.clone(), agents, options, ..Default::default() };
+pub fn serve(task_config: &TaskConfig, agents: usize, port: u16, threads: usize) -> Result<RemoteSource, GameError> {
+    let options = task_config.options.clone();
+    let behavior = BehaviorOptions { env: task_config.agent.clone(), agents, options, ..Default::default() };
     let options = PlayerOptions { port, threads: threads.max(1), behaviors: vec![behavior], ..Default::default() };
     let mut player = Player::connect(&options, Log::to_stderr())?;
     let behavior = &player.behaviors()[0];

@@ -15,7 +15,7 @@ use bevy_egui::egui::{Align2, Area, Id, Slider};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
 use bevy_marathon::look::FollowCamera;
 use bevy_marathon::{Anatomy, Episode, OwnGround, Part, RagdollState, pose};
-use marathon_runs::Setting;
+use marathon_runs::TaskConfig;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -42,9 +42,9 @@ impl Playback {
     /// # Errors
     /// If there is no such agent.
     pub fn new(recording: Recording) -> Result<Self, GameError> {
-        let Setting { agent, options } = &recording.setting;
+        let TaskConfig { agent, options } = &recording.task_config;
         let model = Arc::new(recording.ground.agent_with(agent, options)?.model()?);
-        let spec = Arc::new(recording.setting.factory()?.spec().clone());
+        let spec = Arc::new(recording.task_config.factory()?.spec().clone());
         let kind = Kind::new(model, Some(spec), recording.dt);
         Ok(Playback { recording: Arc::new(recording), kind, at: 0.0 })
     }
@@ -83,7 +83,7 @@ fn open(
             Ok(playback) => {
                 let recording = playback.recording();
                 scenario.mode = Mode::Replay;
-                (scenario.agent, scenario.agents) = (recording.setting.agent.clone(), recording.agents);
+                (scenario.agent, scenario.agents) = (recording.task_config.agent.clone(), recording.agents);
                 commands.insert_resource(playback);
                 loads.write(LoadScenario);
             }

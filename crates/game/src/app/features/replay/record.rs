@@ -94,7 +94,7 @@ fn control(
     let Some((_, anatomy, _)) = all.first() else { return };
     *requested = false;
     let places = all.iter().flat_map(|(.., t)| t.translation.to_array()).collect();
-    let recording = Recording::new(loaded.setting.clone(), loaded.ground, anatomy.dt, places);
+    let recording = Recording::new(loaded.task_config.clone(), loaded.ground, anatomy.dt, places);
     commands.insert_resource(Recorder { recording, until: Duration::ZERO });
     notes.say("recording; the same key ends it");
 }
@@ -151,7 +151,7 @@ fn finish(recorder: &Recorder, why: &str, notes: &mut Notifications) {
 
 /// Saves under the first free name.
 fn keep(recording: &Recording) -> Result<PathBuf, GameError> {
-    let path = free_name(&file_stem(&recording.setting.agent), "replay");
+    let path = free_name(&file_stem(&recording.task_config.agent), "replay");
     recording.save(&path)?;
     Ok(path)
 }

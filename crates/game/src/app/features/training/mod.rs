@@ -111,13 +111,13 @@ fn sync_run(
         *failed = false;
     }
     let wanted = scenario.source == PolicySource::Trainer;
-    let fits = run.as_ref().is_some_and(|run| run.is_for(&loaded.setting, scenario.ground) && !run.is_discarded());
+    let fits = run.as_ref().is_some_and(|run| run.is_for(&loaded.task_config, scenario.ground) && !run.is_discarded());
     if let Some(run) = run.filter(|_| !(wanted && fits)) {
         run.finish(&mut notes);
         commands.remove_resource::<TrainingRun>();
     }
     if wanted && !fits && !*failed {
-        match TrainingRun::start(&loaded.setting, scenario.ground, &options) {
+        match TrainingRun::start(&loaded.task_config, scenario.ground, &options) {
             Ok(run) => {
                 info!("learning {} from random weights, seed {}", scenario.agent, options.seed);
                 commands.insert_resource(run);

@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use bevy_marathon::Ground;
 use marathon_learn::{Control, IterationStats, Policy, Snapshot, TrainConfig, train};
 use marathon_physics::lanes::Isa;
-use marathon_runs::{Flags, LearnOptions, RunError, RunOptions, Session, Setting, Task};
+use marathon_runs::{Flags, LearnOptions, RunError, RunOptions, Session, Task, TaskConfig};
 use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
@@ -59,7 +59,7 @@ struct Shared {
 #[derive(Resource)]
 pub struct TrainingRun {
     shared: Arc<(Mutex<Shared>, Condvar)>,
-    setting: Setting,
+    task_config: TaskConfig,
     ground: Ground,
     shown: Option<Arc<Policy>>,
     /// Seconds of the picture since the start.
@@ -70,12 +70,12 @@ pub struct TrainingRun {
 ///
 /// # Errors
 /// If the options make no sense, or the file is no configuration for the agent.
-pub fn settings(setting: &Setting, options: &TrainingOptions) -> Result<TrainConfig, RunError> {
+pub fn settings(task_config: &TaskConfig, options: &TrainingOptions) -> Result<TrainConfig, RunError> {
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
     let threads = options.learn.threads.unwrap_or(cores.saturating_sub(1).max(1));
     let learn = LearnOptions { seed: Some(options.seed), threads: Some(threads), ..options.learn.clone() };
     let run = RunOptions { learn, ..Default::default() };
-    let (session, _) = Session::open(Some(Task::set(setting.clone())), &run, None, true)?;
+    let (session, _) = Session::open(Some(Task::set(task_config.clone())), &run, None, true)?;
     Ok(session.run.config)
 }
 
@@ -84,10 +84,11 @@ impl TrainingRun {
     ///
     /// # Errors
     /// If the configuration cannot be used.
-    pub fn start(setting: &Setting, ground: Ground, options: &TrainingOptions) -> Result<Self, String> {
+    pub fn start(task_config: &TaskConfig, ground: Ground, options: &TrainingOptions) -> Result<Self, String> {
         let spelled = |error: RunError| error.spelled(&Flags("marathon"));
-        let config = settings(setting, options).map_err(spelled)?;
-        let agent = ground.agent_with(&setting.agent, &setting.options).map_err(|error| spelled(error.into()))?;
+        let config = settings(task_config, options).map_err(spelled)?;
+        let agent =
+            ground.agent_with(&task_config.agent, &task_config.options).map_err(|error| spelled(error.into()))?;
         let factory = agent.shards(Isa::best()).map_err(|error| spelled(error.into()))?;
         let shared = Arc::new((Mutex::new(Shared::default()), Condvar::new()));
         lock(&shared).progress.state = "first steps".into();
@@ -107,7 +108,7 @@ impl TrainingRun {
         };
         let thread = std::thread::Builder::new().name("marathon-trainer".into()).spawn(learn);
         thread.map_err(|e| format!("the trainer's thread cannot be started: {e}"))?;
-        Ok(TrainingRun { shared, setting: setting.clone(), ground, shown: None, age: 0.0 })
+        Ok(TrainingRun { shared, task_config: task_config.clone(), ground, shown: None, age: 0.0 })
     }
 
     /// The progress.
@@ -136,8 +137,8 @@ impl TrainingRun {
     }
 
     /// Whether the run is for this task and ground.
-    pub fn is_for(&self, setting: &Setting, ground: Ground) -> bool {
-        self.setting == *setting && self.ground == ground
+    pub fn is_for(&self, task_config: &TaskConfig, ground: Ground) -> bool {
+        self.task_config == *task_config && self.ground == ground
     }
 
     /// The newest policy, if it has changed since the last call or `again` is set.
@@ -172,7 +173,7 @@ impl TrainingRun {
             notes.say(format!("{why}there is nothing to save yet"));
             return;
         };
-        match save(&policy, &self.setting.agent) {
+        match save(&policy, &self.task_config.agent) {
             Ok(path) => {
                 lock(&self.shared).settled = (Some(policy), now);
                 notes.say(format!("{why}saved as {}", path.display()));

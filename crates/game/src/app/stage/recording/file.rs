@@ -5,7 +5,7 @@ use crate::app::error::GameError;
 use crate::app::files::exists;
 use bevy_marathon::Ground;
 use marathon_physics::budget;
-use marathon_runs::Setting;
+use marathon_runs::TaskConfig;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde_json::Value;
 use std::collections::HashMap;
@@ -56,7 +56,7 @@ impl Recording {
         }
         // one entry, because several would be written in any order
         let about = serde_json::json!({
-            "version": VERSION, "ground": self.ground.name(), "dt": self.dt, "task": self.setting,
+            "version": VERSION, "ground": self.ground.name(), "dt": self.dt, "task": self.task_config,
         });
         let meta = HashMap::from([(FORMAT.to_string(), about.to_string())]);
         let file = safetensors::serialize(views, Some(meta)).map_err(|e| broken(e.to_string()))?;
@@ -92,7 +92,7 @@ impl Recording {
         if self.grounds.is_empty() {
             return Ok(None);
         }
-        let Setting { agent, options } = &self.setting;
+        let TaskConfig { agent, options } = &self.task_config;
         let model = self.ground.agent_with(agent, options)?.model()?;
         let points: Vec<usize> = model.hfields.iter().map(|field| field.nrow * field.ncol).collect();
         let fits = |lie: &&Lie| lie.fields.iter().map(Vec::len).eq(points.iter().copied());
@@ -121,9 +121,9 @@ impl Recording {
             return Err(bad(format!("its version is {found}, expected {VERSION}")));
         }
         let tensors = Tensors { file: SafeTensors::deserialize(&bytes).map_err(|e| no_recording(&e))?, bad: &bad };
-        let setting: Setting =
+        let task_config: TaskConfig =
             serde_json::from_value(about["task"].clone()).map_err(|e| bad(format!("its task cannot be read: {e}")))?;
-        let spec = setting.factory()?.spec().clone();
+        let spec = task_config.factory()?.spec().clone();
         let found = about["ground"].as_str().unwrap_or_default();
         let ground = Ground::named(found).ok_or_else(|| {
             let known = Ground::ALL.map(Ground::name).join(", ");
@@ -154,7 +154,7 @@ impl Recording {
         }
         let [numbers, terms, places, actions, untimed] =
             [numbers, terms, places, actions, untimed].map(|tensor| narrow(&tensor));
-        let empty = Recording::new(setting, ground, dt, places);
+        let empty = Recording::new(task_config, ground, dt, places);
         let mut recording = Recording { agents, qpos, numbers, terms, actions, commands, untimed, ..empty };
         let (lies, elevations) = (tensors.read("lies", LIE)?.2, tensors.read("elevations", 2)?.2);
         let points: f64 = elevations.as_chunks::<2>().0.iter().map(|[_, times]| times.max(0.0)).sum();
@@ -238,9 +238,9 @@ mod tests {
     use crate::app::stage::recording::Row;
 
     fn sample() -> Result<Recording, GameError> {
-        let setting = Setting::named("hopper")?;
-        let spec = setting.factory()?.spec().clone();
-        let mut recording = Recording::new(setting, Ground::Hills, spec.dt, vec![0.0, 0.0, 0.0, 0.0, 0.0, -2.0]);
+        let task_config = TaskConfig::named("hopper")?;
+        let spec = task_config.factory()?.spec().clone();
+        let mut recording = Recording::new(task_config, Ground::Hills, spec.dt, vec![0.0, 0.0, 0.0, 0.0, 0.0, -2.0]);
         let field = Ground::Hills.agent("hopper")?.model()?.hfields[0].clone();
         let grounds = [3.5, -0.25].map(|z| {
             let mut points = vec![1.0; field.nrow * field.ncol];

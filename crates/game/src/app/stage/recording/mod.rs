@@ -7,7 +7,7 @@ mod file;
 use bevy::prelude::*;
 use bevy_marathon::{Anatomy, Episode, Ground, PoseSample, pose};
 use marathon_physics::Model;
-use marathon_runs::Setting;
+use marathon_runs::TaskConfig;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ pub struct PlayRecording(pub PathBuf);
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
     /// The task.
-    pub setting: Setting,
+    pub task_config: TaskConfig,
     /// The ground.
     pub ground: Ground,
     /// Seconds between frames.
@@ -75,11 +75,11 @@ pub struct Row<'a> {
 
 impl Recording {
     /// A recording without frames.
-    pub fn new(setting: Setting, ground: Ground, dt: f64, places: Vec<f32>) -> Self {
+    pub fn new(task_config: TaskConfig, ground: Ground, dt: f64, places: Vec<f32>) -> Self {
         let agents = places.len() / 3;
         let (numbers, terms, actions, grounds) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let (qpos, commands, untimed) = (Vec::new(), Vec::new(), Vec::new());
-        Recording { setting, ground, dt, agents, places, qpos, numbers, terms, actions, commands, untimed, grounds }
+        Recording { task_config, ground, dt, agents, places, qpos, numbers, terms, actions, commands, untimed, grounds }
     }
 
     /// Number of frames.

@@ -11,7 +11,7 @@ const APART: f64 = 0.75;
 
 /// The memory slots that hold the stored states of an agent.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Relive {
+pub(super) struct FallReplay {
     /// The first slot.
     pub slot: usize,
     /// Fraction of the episodes that start before the last fall.
@@ -25,7 +25,7 @@ pub(super) struct Relive {
     pub also: Option<usize>,
 }
 
-impl Relive {
+impl FallReplay {
     /// Memory size of an agent whose last slots are these. If no falls are replayed, only the slots before them count.
     pub fn memory(self) -> usize {
         self.slot + if self.share > 0.0 { 3 + 3 * self.state() } else { 0 }

@@ -40,7 +40,7 @@ impl From<Options> for TaskOptions {
 
 /// A task of the registry with its arguments.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Setting {
+pub struct TaskConfig {
     /// Registry name of the agent.
     pub agent: String,
     /// Its arguments; those that are not here have their defaults. Files have motion clips in a second entry, `clips`.
@@ -48,32 +48,32 @@ pub struct Setting {
     pub options: Options,
 }
 
-impl Setting {
+impl TaskConfig {
     /// A task with its defaults, by any of its names.
     ///
     /// # Errors
     /// If there is none; the text names the nearest.
     pub fn named(name: &str) -> Result<Self, RunError> {
-        Ok(Setting { agent: registry::agent(name)?.facts().id, ..Setting::default() })
+        Ok(TaskConfig { agent: registry::agent(name)?.facts().id, ..TaskConfig::default() })
     }
 
     /// The task that a policy is for, without what only helped to learn; of a role's policy, that in which it has the role.
-    pub fn of(policy: &PolicyMeta) -> Self {
-        let whole = Self::asked(policy);
-        Setting { options: whole.options.without(&OF_LEARNING), ..whole }
+    pub fn of_policy(policy: &PolicyMeta) -> Self {
+        let whole = Self::with_training_options(policy);
+        TaskConfig { options: whole.options.without(&OF_LEARNING), ..whole }
     }
 
     /// The same with all arguments of a policy that has been [loaded](crate::policy_file::load_all): those that only help to learn are
     /// among them if the caller has asked for them.
-    pub fn asked(policy: &PolicyMeta) -> Self {
-        Setting { agent: task_of_role(&policy.agent).into(), options: policy.options.clone() }
+    pub fn with_training_options(policy: &PolicyMeta) -> Self {
+        TaskConfig { agent: task_of_role(&policy.agent).into(), options: policy.options.clone() }
     }
 
     /// The same with the option `start` set to `first`, if the agent has this option.
     ///
     /// # Errors
     /// If there is no such agent.
-    pub fn from_the_first(self) -> Result<Self, RunError> {
+    pub fn starting_first(self) -> Result<Self, RunError> {
         if !registry::agent(&self.agent)?.has_option(START) {
             return Ok(self);
         }
@@ -108,8 +108,8 @@ impl Setting {
         Some(registry::global().agent_with(&self.agent, &self.options).ok()?.facts().model)
     }
 
-    /// The same with all arguments that another setting of the agent has.
-    pub fn overlaid(mut self, other: &Setting) -> Self {
+    /// The same with all arguments that another configuration of the agent has.
+    pub fn overlay(mut self, other: &TaskConfig) -> Self {
         for (name, value) in other.options.iter() {
             self.options.set(name, value.clone());
         }
@@ -161,21 +161,24 @@ mod tests {
 
     #[test]
     fn who_plays_a_policy_has_not_what_only_helped_to_learn() {
-        let options =
-            Options::new().with("knocked", 0.2).with("mortal", 0.5).with("price", 20.0).with("start", "adaptive");
+        let options = Options::new()
+            .with("start_pushed_prob", 0.2)
+            .with("end_on_fall_prob", 0.5)
+            .with("fall_penalty", 20.0)
+            .with("start", "adaptive");
         let spec = registry::factory_with("MarathonManController", &options, Isa::best()).unwrap().spec().clone();
         let meta = PolicyMeta::of(&spec, vec![8], Activation::Tanh);
-        assert_eq!(meta.options.get("knocked"), Some(&Value::Number(0.2)));
-        let played = |setting: Setting| setting.factory().unwrap().spec().options.clone();
-        let options = played(Setting::of(&meta));
-        for (name, value) in [("knocked", 0.0), ("mortal", 0.0), ("price", 20.0)] {
+        assert_eq!(meta.options.get("start_pushed_prob"), Some(&Value::Number(0.2)));
+        let played = |task_config: TaskConfig| task_config.factory().unwrap().spec().options.clone();
+        let options = played(TaskConfig::of_policy(&meta));
+        for (name, value) in [("start_pushed_prob", 0.0), ("end_on_fall_prob", 0.0), ("fall_penalty", 20.0)] {
             assert_eq!(options.get(name), Some(&Value::Number(value)), "{name}");
         }
         assert_eq!(options.get("start"), Some(&Value::Text("adaptive".into())));
-        let options = played(Setting::of(&meta).from_the_first().unwrap());
+        let options = played(TaskConfig::of_policy(&meta).starting_first().unwrap());
         assert_eq!(options.get("start"), Some(&Value::Text("first".into())));
         // who can start in one way only does
-        let hopper = Setting::named("hopper").unwrap();
-        assert_eq!(hopper.clone().from_the_first().unwrap(), hopper);
+        let hopper = TaskConfig::named("hopper").unwrap();
+        assert_eq!(hopper.clone().starting_first().unwrap(), hopper);
     }
 }

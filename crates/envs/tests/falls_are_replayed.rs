@@ -1,6 +1,6 @@
-//! With `relive`, a fraction of the episodes of commanded figures starts 0.75 to 1.5 s before the figure's last fall,
+//! With `replay_falls_prob`, a fraction of the episodes of commanded figures starts 0.75 to 1.5 s before the figure's last fall,
 //! with its pose, velocities and gait. A figure that falls right after its start keeps the state from before the
-//! earlier fall. Without `relive`, or before any fall, episodes start as usual.
+//! earlier fall. Without `replay_falls_prob`, or before any fall, episodes start as usual.
 
 mod common;
 
@@ -125,19 +125,19 @@ fn starts_before_the_fall(figure: Figure, list: &[(&str, &str)]) {
 
 #[test]
 fn the_steered_figure_starts_before_its_fall() {
-    starts_before_the_fall(MARATHON_MAN, &[("relive", "1")]);
+    starts_before_the_fall(MARATHON_MAN, &[("replay_falls_prob", "1")]);
 }
 
 #[test]
 fn a_figure_under_player_control_starts_before_its_fall() {
-    starts_before_the_fall(PLAYED, &[("relive", "1"), ("mortal", "1"), ("clip", "walk,stand")]);
+    starts_before_the_fall(PLAYED, &[("replay_falls_prob", "1"), ("end_on_fall_prob", "1"), ("clip", "walk,stand")]);
 }
 
 #[test]
 fn figures_in_a_plane_start_before_their_fall() {
     for figure in [WALKER, HOPPER] {
-        starts_before_the_fall(figure, &[("relive", "1")]);
-        starts_before_the_fall(figure, &[("relive", "1"), ("commander", "adversary")]);
+        starts_before_the_fall(figure, &[("replay_falls_prob", "1")]);
+        starts_before_the_fall(figure, &[("replay_falls_prob", "1"), ("commander", "adversary")]);
     }
 }
 
