@@ -100,8 +100,8 @@ def collect(program: str) -> dict[str, dict[str, list[str]]]:
     """All words, with the places of each by kind. `--initialize-from` and `initialize_from` are one word."""
     tasks = json.loads(output(program, "--json", "list"))["agents"]
     options = ((option["name"], "task option", task["id"]) for task in tasks for option in task["options"])
-    files = [ROOT / "python/marathon_envs/_native.pyi", *sorted((ROOT / "python/marathon_envs").rglob("[!_]*.py"))]
-    modules = [python(ast.parse(f.read_text()).body, f.stem.replace("_native", "marathon_envs")) for f in files]
+    files = [ROOT / "python/marathon_rl/_native.pyi", *sorted((ROOT / "python/marathon_rl").rglob("[!_]*.py"))]
+    modules = [python(ast.parse(f.read_text()).body, f.stem.replace("_native", "marathon_rl")) for f in files]
     words: dict[str, dict[str, list[str]]] = {}
     for source in [command_line(program), options, configuration(program), *modules]:
         for name, kind, place in source:

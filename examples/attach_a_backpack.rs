@@ -3,7 +3,7 @@
 //! A [`ModelSpec`] is a parsed MJCF file, the counterpart of MuJoCo's `mjSpec`. Parts are added, changed, replaced and
 //! removed by name, then [`ModelSpec::compile`] makes the [`Model`]. Keyframes keep their meaning: the start pose of the humanoid
 //! gets a number for the strap of the backpack. [`ModelSpec::to_xml`] writes the edited model as MJCF. An agent takes it as
-//! `marathon::envs::ModelSource::from(spec)`.
+//! `marathon_rl::envs::ModelSource::from(spec)`.
 //!
 //! The example lets the humanoid fall with and without ten kilograms on its back. Its motors are off, so the weight decides
 //! which way it falls.
@@ -12,8 +12,8 @@
 //! cargo run --release -p marathon-examples --bin attach_a_backpack
 //! ```
 
-use marathon::physics::spec::{Actuator, Body, Geom, Joint, Kind, ModelSpec, Sensor, Site};
-use marathon::physics::{Batch, BatchOptions, Model};
+use marathon_rl::physics::spec::{Actuator, Body, Geom, Joint, Kind, ModelSpec, Sensor, Site};
+use marathon_rl::physics::{Batch, BatchOptions, Model};
 use std::error::Error;
 use std::path::Path;
 

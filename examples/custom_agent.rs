@@ -15,8 +15,8 @@
 //! cargo run --release -p marathon-examples --bin custom_agent
 //! ```
 
-use marathon::envs::{Agent, Facts, Motors, Obs, Part, Senses, Terms, VecEnv, VecEnvOptions, names, register};
-use marathon::physics::lanes::Real;
+use marathon_rl::envs::{Agent, Facts, Motors, Obs, Part, Senses, Terms, VecEnv, VecEnvOptions, names, register};
+use marathon_rl::physics::lanes::Real;
 use std::error::Error;
 use std::sync::Arc;
 

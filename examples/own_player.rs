@@ -20,7 +20,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 fn main() -> ExitCode {
-    if let Err(error) = marathon::envs::register(Arc::new(rover::Rover)) {
+    if let Err(error) = marathon_rl::envs::register(Arc::new(rover::Rover)) {
         eprintln!("error: {error}");
         return ExitCode::FAILURE;
     }

@@ -11,9 +11,9 @@
 //! cargo run --release -p marathon-examples --bin render_a_policy -- walker2d.safetensors strip.png
 //! ```
 
-use marathon::envs::{Autoreset, VecEnv, VecEnvOptions, agent};
-use marathon::learn::Policy;
-use marathon::render::{Corner, Follow, Renderer, Scene, status_line, strip};
+use marathon_rl::envs::{Autoreset, VecEnv, VecEnvOptions, agent};
+use marathon_rl::learn::Policy;
+use marathon_rl::render::{Corner, Follow, Renderer, Scene, status_line, strip};
 use std::error::Error;
 use std::path::Path;
 

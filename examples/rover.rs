@@ -7,8 +7,8 @@
 //! Other sources can replace the schedule: a program (`steer_an_agent.rs`), a trainer in Python (`own_player.rs`), or a
 //! gamepad (`crates/bevy_marathon/examples/steer.rs`).
 
-use marathon::envs::{Agent, CommandRange, EpisodeRng, Facts, Motors, Obs, Part, Senses, Terms, Tolerance, names};
-use marathon::physics::lanes::Real;
+use marathon_rl::envs::{Agent, CommandRange, EpisodeRng, Facts, Motors, Obs, Part, Senses, Terms, Tolerance, names};
+use marathon_rl::physics::lanes::Real;
 
 const MODEL: &str = include_str!("rover.xml");
 

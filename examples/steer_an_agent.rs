@@ -13,7 +13,7 @@ mod rover;
 use std::error::Error;
 use std::sync::Arc;
 
-use marathon::envs::{Spec, Step, VecEnv, VecEnvOptions, register};
+use marathon_rl::envs::{Spec, Step, VecEnv, VecEnvOptions, register};
 use rover::Rover;
 
 /// Drives for some decisions, and returns the mean of the rovers' velocity errors, m/s.

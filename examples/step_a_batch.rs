@@ -12,7 +12,7 @@
 //! cargo run --release -p marathon-examples --bin step_a_batch
 //! ```
 
-use marathon::physics::{Batch, BatchOptions, Model};
+use marathon_rl::physics::{Batch, BatchOptions, Model};
 use std::error::Error;
 use std::path::Path;
 

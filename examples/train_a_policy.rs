@@ -11,7 +11,7 @@
 //! cargo run --release -p marathon-examples --bin train_a_policy -- 100000 walker.safetensors
 //! ```
 
-use marathon::prelude::*;
+use marathon_rl::prelude::*;
 use std::path::PathBuf;
 
 /// Mean speed (m/s) and fraction of episodes that end in a fall at which the run stops early.

@@ -17,7 +17,7 @@ import numpy as np
 import torch
 from torch import nn
 
-import marathon_envs  # noqa: F401 (registers the tasks with Gymnasium)
+import marathon_rl  # noqa: F401 (registers the tasks with Gymnasium)
 
 HORIZON, EPOCHS, MINIBATCHES = 64, 5, 8
 GAMMA, LAMBDA, CLIP, ENTROPY = 0.99, 0.95, 0.2, 0.001
@@ -53,7 +53,7 @@ def learn(task: str, steps: int, agents: int, seed: int) -> list[float]:  # noqa
     # networks this small are slower on several threads
     torch.set_num_threads(1)
     mode = gymnasium.vector.AutoresetMode.SAME_STEP
-    envs = gymnasium.make_vec(f"marathon_envs/{task}", num_envs=agents, autoreset_mode=mode, copy=False)
+    envs = gymnasium.make_vec(f"marathon_rl/{task}", num_envs=agents, autoreset_mode=mode, copy=False)
     space = envs.single_action_space
     middle, half = torch.tensor((space.high + space.low) / 2), torch.tensor((space.high - space.low) / 2)
     obs_size, act_size = envs.single_observation_space.shape[0], space.shape[0]

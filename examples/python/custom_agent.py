@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from marathon_envs import MarathonAgent, train
+from marathon_rl import MarathonAgent, train
 
 
 class Inchworm(MarathonAgent):

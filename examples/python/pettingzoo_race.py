@@ -12,13 +12,13 @@ trainer. The winner is who comes farthest.
 import argparse
 from pathlib import Path
 
-import marathon_envs
-from marathon_envs.adapters.pettingzoo import MarathonParallelEnv
+import marathon_rl
+from marathon_rl.adapters.pettingzoo import MarathonParallelEnv
 
 
 def race(task: str, steps: int, runners: int, seconds: float, picture: Path | None) -> None:
     """Train two policies, race them, and print who came how far."""
-    old, young = (marathon_envs.train(task, steps=n, seed=1).policy for n in (steps, steps // 10))
+    old, young = (marathon_rl.train(task, steps=n, seed=1).policy for n in (steps, steps // 10))
     env = MarathonParallelEnv(task, runners, render_mode="rgb_array")
     policies = {name: (young if i % 2 else old) for i, name in enumerate(env.possible_agents)}
     distance = dict.fromkeys(env.possible_agents, 0.0)

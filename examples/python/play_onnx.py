@@ -17,12 +17,12 @@ import gymnasium
 import numpy as np
 import onnxruntime
 
-import marathon_envs
+import marathon_rl
 
 
 def train(task: str, steps: int, file: Path) -> None:
     """Learn a task, and write the policy."""
-    result = marathon_envs.train(task, steps=steps, seed=1)
+    result = marathon_rl.train(task, steps=steps, seed=1)
     result.policy.save(file)
     print(f"trained: return {result.evaluation['return_mean']:.1f}, written to {file}")
 
@@ -30,8 +30,8 @@ def train(task: str, steps: int, file: Path) -> None:
 def play(task: str, file: Path, episodes: int) -> None:
     """Play whole episodes in Gymnasium's interface."""
     network = onnxruntime.InferenceSession(str(file), providers=["CPUExecutionProvider"])
-    env = gymnasium.make(f"marathon_envs/{task}")
-    returns, difference, ours = [], 0.0, marathon_envs.load_policy(file, task)
+    env = gymnasium.make(f"marathon_rl/{task}")
+    returns, difference, ours = [], 0.0, marathon_rl.load_policy(file, task)
     for episode in range(episodes):
         obs, _ = env.reset(seed=episode)
         total, ended = 0.0, False

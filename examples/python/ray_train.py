@@ -1,6 +1,6 @@
 """Training on many processes: Ray's workers play, one learner learns, and the policy has the bits of a run without Ray.
 
-    pip install "marathon-envs[ray]"
+    pip install "marathon-rl[ray]"
     python ray_train.py                           two workers on this machine
     python ray_train.py --kill                    one of them is killed on the way
     python ray_train.py --address 10.0.0.1:6379   on a cluster begun with `ray start`
@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 import ray
 
-from marathon_envs.ray import Workers, train
+from marathon_rl.ray import Workers, train
 
 
 def main(words: Sequence[str] | None = None) -> str:

@@ -1,6 +1,6 @@
 """RLlib's PPO on the environments of this package, many agents stepped natively in each of its env runners.
 
-pip install "marathon-envs[rllib]"
+pip install "marathon-rl[rllib]"
 python rllib.py --task Hopper-v5 --iterations 20
 """
 
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from ray.rllib.algorithms.ppo import PPOConfig
 
-import marathon_envs.ray
+import marathon_rl.ray
 
 
 def main(words: Sequence[str] | None = None) -> list[float]:
@@ -22,11 +22,11 @@ def main(words: Sequence[str] | None = None) -> list[float]:
     parser.add_argument("--batch", type=int, default=8192, help="decisions per iteration")
     args = parser.parse_args(words)
 
-    marathon_envs.ray.register()
+    marathon_rl.ray.register()
     config = (
         PPOConfig()
         # env_config may have arguments of the task, such as {"ctrl_cost_weight": 0.01}
-        .environment(f"marathon_envs/{args.task}")
+        .environment(f"marathon_rl/{args.task}")
         .env_runners(
             num_env_runners=args.runners,
             num_envs_per_env_runner=args.agents,

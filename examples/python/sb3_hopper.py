@@ -20,8 +20,8 @@ from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
-import marathon_envs  # noqa: F401 (registers the tasks with Gymnasium)
-from marathon_envs.adapters.sb3 import Sb3VecEnv
+import marathon_rl  # noqa: F401 (registers the tasks with Gymnasium)
+from marathon_rl.adapters.sb3 import Sb3VecEnv
 
 TASK = "Hopper-v5"
 
@@ -58,7 +58,7 @@ if __name__ == "__main__":
     parser.add_argument("--algorithm", choices=("ppo", "sac"), default="ppo")
     parser.add_argument("--steps", type=int, default=1_000_000, help="steps of all hoppers together")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--judge", default=f"marathon_envs/{TASK}", help="task of Gymnasium's registry to play in")
+    parser.add_argument("--judge", default=f"marathon_rl/{TASK}", help="task of Gymnasium's registry to play in")
     arguments = parser.parse_args()
     # networks this small are slower on several threads
     torch.set_num_threads(1)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from marathon_envs import CommandRange, MarathonAgent, Tolerance, train
+from marathon_rl import CommandRange, MarathonAgent, Tolerance, train
 
 FASTEST = 2.0
 

@@ -22,7 +22,7 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-import marathon_envs
+import marathon_rl
 
 TASKS = ("Hopper-v0", "Humanoid-v0", "Hopper-v5", "Humanoid-v5")
 
@@ -30,7 +30,7 @@ TASKS = ("Hopper-v0", "Humanoid-v0", "Hopper-v5", "Humanoid-v5")
 class Standin:
     """A native environment that does nothing."""
 
-    def __init__(self, env: marathon_envs.VecEnv, results: tuple[np.ndarray, ...]) -> None:
+    def __init__(self, env: marathon_rl.VecEnv, results: tuple[np.ndarray, ...]) -> None:
         self._env, self._results = env, results
         for name in ("spec", "copy", "reward_terms", "info", "forward", "diverged", "final_obs"):
             setattr(self, name, getattr(env, name))
@@ -59,7 +59,7 @@ def microseconds(f: Callable[[], Any], repeats: int) -> float:
 
 def gymnasium_step(task: str, agents: int, mode: AutoresetMode, ends: int, repeats: int = 400) -> float:
     """Measure `MarathonVectorEnv.step` without the native step, in which `ends` episodes end."""
-    envs = gymnasium.make_vec(f"marathon_envs/{task}", num_envs=agents, autoreset_mode=mode, threads=1)
+    envs = gymnasium.make_vec(f"marathon_rl/{task}", num_envs=agents, autoreset_mode=mode, threads=1)
     envs.reset(seed=1)
     actions = np.zeros(envs.action_space.shape, np.float32)
     obs, reward, terminated, truncated = envs._env.step(actions)
@@ -70,7 +70,7 @@ def gymnasium_step(task: str, agents: int, mode: AutoresetMode, ends: int, repea
 
 def native_step(repeats: int = 2000) -> float:
     """Measure a step of `VecEnv` with next to no physics."""
-    env = marathon_envs.VecEnv("InvertedPendulum-v5", 1, threads=1)
+    env = marathon_rl.VecEnv("InvertedPendulum-v5", 1, threads=1)
     env.reset(1)
     actions = np.zeros((1, 1), np.float32)
     return microseconds(lambda: env.step(actions), repeats)

@@ -7,7 +7,7 @@ the workers wait is not counted. `passed` is by time passed. `free` is what it w
 worker, from the processor time that the rollouts took: that of the busiest worker and, one after the other, of the
 learner's process; it is what to look at where others use the machine. The last line has the medians of the ratios.
 
-Needs `marathon-envs[ray]`.
+Needs `marathon-rl[ray]`.
 """
 
 import argparse
@@ -17,7 +17,7 @@ from collections.abc import Iterator
 
 import ray
 
-from marathon_envs.ray import Bytes, Workers, train
+from marathon_rl.ray import Bytes, Workers, train
 
 
 class Timed(Workers):

@@ -2,7 +2,7 @@
 
     $ python python/bench/returns.py docs/studies/gymnasium-returns.csv
 
-Every task is trained with five seeds by `marathon_envs.train` and its fast settings, on one thread. Beside them,
+Every task is trained with five seeds by `marathon_rl.train` and its fast settings, on one thread. Beside them,
 Stable-Baselines3's PPO learns in Gymnasium, on one thread and for the processor time that the native run of the same
 seed took: with its own defaults and with the settings of RL Baselines3 Zoo. Each policy is played here (100 episodes)
 and in Gymnasium (20 episodes) with its best actions, and is a line of the CSV file. Lines that are there already are
@@ -23,8 +23,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-import marathon_envs
-from marathon_envs.judge import Act, judge
+import marathon_rl
+from marathon_rl.judge import Act, judge
 
 TASKS = ["Hopper-v5", "Walker2d-v5", "HalfCheetah-v5", "Ant-v5", "Humanoid-v5"]
 # the return that a task is to reach, and the processor seconds it may take
@@ -96,7 +96,7 @@ def main() -> None:
 def native(task: str, seed: int, steps: int | None) -> dict[str, str]:
     """A native run."""
     start = time.process_time()
-    result = marathon_envs.train(task, seed=seed, threads=1, steps=steps)
+    result = marathon_rl.train(task, seed=seed, threads=1, steps=steps)
     return row((task, "marathon", seed), result.steps, time.process_time() - start, result.policy)
 
 

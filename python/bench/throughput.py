@@ -22,7 +22,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-import marathon_envs
+import marathon_rl
 
 TASKS = ["Hopper-v5", "Walker2d-v5", "Ant-v5", "Humanoid-v5"]
 # rows of actions that are drawn beforehand
@@ -58,7 +58,7 @@ class Side:
 
 def marathon(task: str, num_envs: int, threads: int) -> Side:
     """Ours."""
-    env = marathon_envs.VecEnv(task, num_envs, threads=threads, autoreset="same_step")
+    env = marathon_rl.VecEnv(task, num_envs, threads=threads, autoreset="same_step")
     env.reset(seed=1)
     name = "marathon" if threads == 1 else f"marathon, {threads} threads"
     return Side(name, num_envs, env.step, actions(task, num_envs, np.float32), [], [])
@@ -82,7 +82,7 @@ def gymnasium_sync(task: str, num_envs: int = GYMNASIUM_AGENTS) -> Side:
 
 def actions(task: str, num_envs: int, dtype: type) -> np.ndarray:
     """Rows of random actions."""
-    spec = marathon_envs.spec(task)
+    spec = marathon_rl.spec(task)
     shape = (DRAWN, num_envs, spec.act_size)
     return np.random.default_rng(1).uniform(spec.action_low, spec.action_high, shape).astype(dtype)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from marathon_envs import MarathonAgent
+from marathon_rl import MarathonAgent
 
 ARM = """
 <mujoco model="arm">

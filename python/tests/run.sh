@@ -20,11 +20,11 @@ wheels="$target/wheels" clean="$target/clean-venv" site="$target/python-site"
 cargo build --release "${packages[@]}" --lib --test errors_say_what_to_do
 rm -rf "$site"
 mkdir -p "$site"
-cp -R python/marathon_envs "$site"
-cp "$target/release/libmarathon_python.so" "$site/marathon_envs/_native.abi3.so"
+cp -R python/marathon_rl "$site"
+cp "$target/release/libmarathon_python.so" "$site/marathon_rl/_native.abi3.so"
 export PYTHONPATH="$site"
-"$python" -m mypy python/marathon_envs
-(cd "$site" && "$python" -m mypy.stubtest marathon_envs._native)
+"$python" -m mypy python/marathon_rl
+(cd "$site" && "$python" -m mypy.stubtest marathon_rl._native)
 "$python" -m pytest --quiet "$@"
 
 if [ -n "${MARATHON_TEST_WHEEL:-}" ]; then
@@ -34,6 +34,6 @@ if [ -n "${MARATHON_TEST_WHEEL:-}" ]; then
   "$python" -m maturin build --quiet --profile packing --out "$wheels"
   python3 -m venv "$clean"
   "$clean/bin/pip" install --quiet --disable-pip-version-check "$wheels"/*.whl
-  (cd "$clean" && bin/python -c "import marathon_envs; marathon_envs.VecEnv('hopper', 2).reset()")
+  (cd "$clean" && bin/python -c "import marathon_rl; marathon_rl.VecEnv('hopper', 2).reset()")
   "$clean/bin/marathon" --json list > /dev/null
 fi

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-import marathon_envs
+import marathon_rl
 
-IDS = marathon_envs.ids()
+IDS = marathon_rl.ids()
 # warnings that the libraries give about themselves; where it is about our environments, tests ask for errors
 pytestmark = pytest.mark.filterwarnings("default")
 
@@ -27,15 +27,15 @@ class TestStableBaselines3:
             if id in gymnasium.registry:
                 # Gymnasium's own tasks have Gymnasium's bounds of actions
                 warnings.filterwarnings("ignore", ".*symmetric and normalized Box action space.*")
-            check_env(marathon_envs.MarathonEnv(id, render_mode="rgb_array", width=32, height=32))
+            check_env(marathon_rl.MarathonEnv(id, render_mode="rgb_array", width=32, height=32))
 
     def test_many_agents_are_as_its_own_vector_of_single_ones(self) -> None:
         from stable_baselines3.common.vec_env import DummyVecEnv  # noqa: PLC0415
 
-        from marathon_envs.adapters.sb3 import Sb3VecEnv  # noqa: PLC0415
+        from marathon_rl.adapters.sb3 import Sb3VecEnv  # noqa: PLC0415
 
         ours = Sb3VecEnv("walker", 4, max_episode_steps=25)
-        theirs = DummyVecEnv([lambda: marathon_envs.MarathonEnv("walker", max_episode_steps=25)] * 4)
+        theirs = DummyVecEnv([lambda: marathon_rl.MarathonEnv("walker", max_episode_steps=25)] * 4)
         for env in (ours, theirs):
             env.seed(7)
         assert np.array_equal(ours.reset(), theirs.reset())
@@ -56,7 +56,7 @@ class TestStableBaselines3:
         from stable_baselines3 import PPO, SAC  # noqa: PLC0415
         from stable_baselines3.common.vec_env import VecMonitor, VecNormalize  # noqa: PLC0415
 
-        from marathon_envs.adapters.sb3 import Sb3VecEnv  # noqa: PLC0415
+        from marathon_rl.adapters.sb3 import Sb3VecEnv  # noqa: PLC0415
 
         env = VecNormalize(VecMonitor(Sb3VecEnv("hopper", 16, render_mode="rgb_array", width=32, height=24)))
         model = PPO("MlpPolicy", env, n_steps=32, batch_size=128, n_epochs=1, seed=1, device="cpu").learn(1024)
@@ -67,7 +67,7 @@ class TestStableBaselines3:
     def test_a_monitor_can_keep_what_a_task_reports(self) -> None:
         from stable_baselines3.common.vec_env import VecMonitor  # noqa: PLC0415
 
-        from marathon_envs.adapters.sb3 import Sb3VecEnv  # noqa: PLC0415
+        from marathon_rl.adapters.sb3 import Sb3VecEnv  # noqa: PLC0415
 
         for id, names in (("Hopper-v5", ("x_position", "z_distance_from_origin")), ("hopper", ("x_position",))):
             native = Sb3VecEnv(id, 3, max_episode_steps=4)
@@ -83,7 +83,7 @@ class TestStableBaselines3:
                     # of the state that the episode ended in, not of the next one's start
                     assert abs(infos[i]["x_position"] - x[i]) < 0.1 and infos[i]["diverged"] is False
             assert ended >= 3
-            assert [spec.id for spec in env.get_attr("spec")] == [f"marathon_envs/{native.task_spec.id}"] * 3
+            assert [spec.id for spec in env.get_attr("spec")] == [f"marathon_rl/{native.task_spec.id}"] * 3
 
 
 class TestTorchRl:
@@ -93,10 +93,10 @@ class TestTorchRl:
     def test_it_makes_environments_by_name(self, id: str) -> None:
         from torchrl.envs import GymEnv, check_env_specs  # noqa: PLC0415
 
-        env = GymEnv(f"marathon_envs/{id}")
+        env = GymEnv(f"marathon_rl/{id}")
         check_env_specs(env)
         assert env.rollout(5, break_when_any_done=False).shape == (5,)
-        assert GymEnv(f"marathon_envs/{id}", frame_skip=2).rollout(2).shape == (2,)
+        assert GymEnv(f"marathon_rl/{id}", frame_skip=2).rollout(2).shape == (2,)
 
     @pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.DISABLED])
     @pytest.mark.parametrize("id", ["Hopper-v0", "Hopper-v5"])
@@ -104,7 +104,7 @@ class TestTorchRl:
         from torchrl.envs import GymWrapper  # noqa: PLC0415
 
         made = {"num_envs": 4, "autoreset_mode": mode, "max_episode_steps": 6, "reward_terms": False}
-        env = GymWrapper(gymnasium.make_vec(f"marathon_envs/{id}", **made))
+        env = GymWrapper(gymnasium.make_vec(f"marathon_rl/{id}", **made))
         rollout = env.rollout(20, break_when_any_done=False)
         assert rollout.shape == (4, 20) and rollout["next", "done"].sum() >= 12
 
@@ -114,7 +114,7 @@ class TestPettingZoo:
     def test_its_api_test_passes(self, id: str) -> None:
         from pettingzoo.test import parallel_api_test  # noqa: PLC0415
 
-        from marathon_envs.adapters.pettingzoo import MarathonParallelEnv  # noqa: PLC0415
+        from marathon_rl.adapters.pettingzoo import MarathonParallelEnv  # noqa: PLC0415
 
         with warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -123,15 +123,15 @@ class TestPettingZoo:
     def test_its_seed_test_passes(self) -> None:
         from pettingzoo.test import parallel_seed_test  # noqa: PLC0415
 
-        from marathon_envs.adapters.pettingzoo import MarathonParallelEnv  # noqa: PLC0415
+        from marathon_rl.adapters.pettingzoo import MarathonParallelEnv  # noqa: PLC0415
 
         parallel_seed_test(lambda: MarathonParallelEnv("ant", 3), num_cycles=50)
 
     def test_agents_live_on_without_those_that_ended(self) -> None:
-        from marathon_envs.adapters.pettingzoo import MarathonParallelEnv  # noqa: PLC0415
+        from marathon_rl.adapters.pettingzoo import MarathonParallelEnv  # noqa: PLC0415
 
         env = MarathonParallelEnv("hopper", 6, render_mode="rgb_array", width=64, height=32)
-        native = marathon_envs.VecEnv("hopper", 6, autoreset="disabled")
+        native = marathon_rl.VecEnv("hopper", 6, autoreset="disabled")
         obs, _ = env.reset(seed=3)
         native.reset(seed=3)
         rng, alive = np.random.default_rng(1), np.ones(6, bool)
@@ -169,7 +169,7 @@ class TestRslRl:
     def test_its_runner_learns(self) -> None:
         from rsl_rl.runners import OnPolicyRunner  # noqa: PLC0415
 
-        from marathon_envs.adapters.rsl_rl import RslRlEnv  # noqa: PLC0415
+        from marathon_rl.adapters.rsl_rl import RslRlEnv  # noqa: PLC0415
 
         env = RslRlEnv("walker", 32, seed=1)
         runner = OnPolicyRunner(env, self.CONFIG, log_dir=None, device="cpu")
@@ -183,10 +183,10 @@ class TestRslRl:
     def test_steps_are_the_native_ones_and_time_outs_are_told(self) -> None:
         import torch  # noqa: PLC0415
 
-        from marathon_envs.adapters.rsl_rl import RslRlEnv  # noqa: PLC0415
+        from marathon_rl.adapters.rsl_rl import RslRlEnv  # noqa: PLC0415
 
         env = RslRlEnv("ant", 20, seed=5, max_episode_steps=10)
-        native = marathon_envs.VecEnv("ant", 20, max_episode_steps=10)
+        native = marathon_rl.VecEnv("ant", 20, max_episode_steps=10)
         assert np.array_equal(env.get_observations()["policy"], native.reset(seed=5))
         env.episode_length_buf[3] = 6
         for step in range(10):
@@ -226,23 +226,23 @@ class TestSkrl:
         assert any(not before[name].equal(after[name]) for name in after)
 
     def test_its_trainer_learns(self) -> None:
-        from marathon_envs.adapters.skrl import SkrlEnv  # noqa: PLC0415
+        from marathon_rl.adapters.skrl import SkrlEnv  # noqa: PLC0415
 
         self.train(SkrlEnv("hopper", 8, seed=1))
 
     def test_it_wraps_the_gymnasium_environment_too(self) -> None:
         from skrl.envs.wrappers.torch import wrap_env  # noqa: PLC0415
 
-        self.train(wrap_env(gymnasium.make_vec("marathon_envs/Hopper-v0", num_envs=4), wrapper="gymnasium"))
+        self.train(wrap_env(gymnasium.make_vec("marathon_rl/Hopper-v0", num_envs=4), wrapper="gymnasium"))
 
     def test_steps_are_the_native_ones(self) -> None:
         import torch  # noqa: PLC0415
 
-        from marathon_envs.adapters.skrl import SkrlEnv  # noqa: PLC0415
+        from marathon_rl.adapters.skrl import SkrlEnv  # noqa: PLC0415
 
         env, native = (
             SkrlEnv("ant", 9, seed=5, max_episode_steps=4),
-            marathon_envs.VecEnv("ant", 9, max_episode_steps=4),
+            marathon_rl.VecEnv("ant", 9, max_episode_steps=4),
         )
         assert np.array_equal(env.reset()[0], native.reset(seed=5))
         for _ in range(9):
@@ -257,7 +257,7 @@ class TestSkrl:
 def dm_env_case() -> type[unittest.TestCase]:
     from dm_env import test_utils  # noqa: PLC0415
 
-    from marathon_envs.adapters.dm_env import DmEnv  # noqa: PLC0415
+    from marathon_rl.adapters.dm_env import DmEnv  # noqa: PLC0415
 
     class Case(test_utils.EnvironmentTestMixin, unittest.TestCase):
         def make_object_under_test(self) -> DmEnv:
@@ -277,7 +277,7 @@ class TestDmEnv:
         assert result.testsRun >= 4 and not result.errors and not result.failures, (result.errors, result.failures)
 
     def test_ends_tell_whether_to_bootstrap(self) -> None:
-        from marathon_envs.adapters.dm_env import DmEnv  # noqa: PLC0415
+        from marathon_rl.adapters.dm_env import DmEnv  # noqa: PLC0415
 
         env = DmEnv("hopper", seed=3, max_episode_steps=5)
         assert env.reset().first()

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from marathon_envs import MarathonAgent, Model, Simulation, VecEnv, train
-from marathon_envs._arrays import Streams
-from marathon_envs.memory import Average, PhaseBonus
+from marathon_rl import MarathonAgent, Model, Simulation, VecEnv, train
+from marathon_rl._arrays import Streams
+from marathon_rl.memory import Average, PhaseBonus
 
 ROOT = Path(__file__).parents[2]
 ASSETS = ROOT / "assets" / "agents"

@@ -13,7 +13,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 
 def test_the_checkers_pass() -> None:
     # Gymnasium's warns of an environment that it did not make itself
-    gymnasium.register("Checked-v0", entry_point="marathon_envs.env:MarathonEnv", kwargs={"task": Arm})
+    gymnasium.register("Checked-v0", entry_point="marathon_rl.env:MarathonEnv", kwargs={"task": Arm})
     check_env(gymnasium.make("Checked-v0", render_mode="rgb_array", width=64, height=48).unwrapped)
     del gymnasium.registry["Checked-v0"]
     env = Arm.make(render_mode="rgb_array", width=64, height=48)
@@ -51,7 +51,7 @@ def test_many_agents_behave_as_gymnasiums_vector_of_single_ones(mode: AutoresetM
 
 
 def test_a_class_can_be_registered() -> None:
-    gymnasium.register("Arm-v0", entry_point="marathon_envs.env:MarathonEnv", kwargs={"task": Arm}, max_episode_steps=7)
+    gymnasium.register("Arm-v0", entry_point="marathon_rl.env:MarathonEnv", kwargs={"task": Arm}, max_episode_steps=7)
     env = gymnasium.make("Arm-v0")
     env.reset(seed=1)
     assert [env.step(np.zeros(1))[3] for _ in range(7)][-1]

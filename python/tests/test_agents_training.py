@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from arm import Arm
 
-from marathon_envs import evaluate, load_policy, train
+from marathon_rl import evaluate, load_policy, train
 
 
 class Leg(Arm):

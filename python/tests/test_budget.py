@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-import marathon_envs
-from marathon_envs import MarathonAgent, MarathonVectorEnv, Model, Renderer, Simulation, VecEnv, train
+import marathon_rl
+from marathon_rl import MarathonAgent, MarathonVectorEnv, Model, Renderer, Simulation, VecEnv, train
 
 PENDULUM = """
 <mujoco>
@@ -58,10 +58,10 @@ def test_agents_beyond_the_budget_are_a_memory_error(name: str) -> None:
 def test_the_budget_can_be_raised() -> None:
     """And agents beyond the present one take no more than it said."""
     code = (
-        "import resource, marathon_envs\n"
+        "import resource, marathon_rl\n"
         "def peak(): return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024\n"
         "before = peak()\n"
-        "try: marathon_envs.VecEnv('Hopper-v5', 40_000, threads=1).reset()\n"
+        "try: marathon_rl.VecEnv('Hopper-v5', 40_000, threads=1).reset()\n"
         "except MemoryError as error: print('refused', error)\n"
         "else: print('made', peak() - before)\n"
     )
@@ -108,6 +108,6 @@ def test_a_run_that_does_not_fit_is_a_memory_error() -> None:
 
 
 def test_evaluate_refuses_more_episodes_than_make_sense() -> None:
-    policy = marathon_envs.train("hopper", agents=16, steps=16, threads=1).policy
+    policy = marathon_rl.train("hopper", agents=16, steps=16, threads=1).policy
     with pytest.raises(ValueError, match=r"episodes is 4611686018427387904, expected at most"):
-        marathon_envs.evaluate(policy, episodes=2**62)
+        marathon_rl.evaluate(policy, episodes=2**62)

@@ -8,9 +8,9 @@ import gymnasium
 import numpy as np
 import pytest
 
-import marathon_envs
-from marathon_envs import CommandRange, MarathonAgent, VecEnv, train
-from marathon_envs._arrays import Streams
+import marathon_rl
+from marathon_rl import CommandRange, MarathonAgent, VecEnv, train
+from marathon_rl._arrays import Streams
 
 CART = """
 <mujoco model="cart">
@@ -183,7 +183,7 @@ def test_what_cannot_be_told_is_refused(command: np.ndarray, message: str) -> No
         carts.set_command(command)
     with pytest.raises(ValueError, match="command 'x' is from 1 to 0, expected a range"):
         CommandRange("x", 1, 0)
-    for hopper in (VecEnv("Hopper-v0", N), gymnasium.make("marathon_envs/Hopper-v0").unwrapped):
+    for hopper in (VecEnv("Hopper-v0", N), gymnasium.make("marathon_rl/Hopper-v0").unwrapped):
         with pytest.raises(ValueError, match=r"the agents of Hopper-v0 take no commands, spec\.command is empty"):
             hopper.set_command(None)
 
@@ -240,10 +240,10 @@ def test_facts_of_a_class_have_names() -> None:
 
 
 def sizes(id: str) -> dict[str, int]:
-    return {name: part.stop - part.start for name, part in marathon_envs.spec(id).observations.items()}
+    return {name: part.stop - part.start for name, part in marathon_rl.spec(id).observations.items()}
 
 
-@pytest.mark.parametrize("id", [id for id in marathon_envs.ids() if id.endswith("-v5") and "Double" not in id])
+@pytest.mark.parametrize("id", [id for id in marathon_rl.ids() if id.endswith("-v5") and "Double" not in id])
 def test_gymnasiums_tasks_name_their_observations_as_gymnasium_does(id: str) -> None:
     structure = gymnasium.make(id).unwrapped.observation_structure  # type: ignore[attr-defined]
     assert sizes(id) == {name: n for name, n in structure.items() if n and name != "skipped_qpos"}
@@ -253,5 +253,5 @@ def test_a_part_of_an_observation_is_taken_by_its_name() -> None:
     env = VecEnv("hopper-stand-v0", 2)
     obs = env.reset(seed=1)
     assert obs[:, env.spec.observations["touch"]].tolist() == obs[:, 13:15].tolist()
-    hopper = marathon_envs.spec("Hopper-v0")
+    hopper = marathon_rl.spec("Hopper-v0")
     assert hopper.observations["touch"] == slice(9, 10, 1) and hopper.metrics == ["forward"] and hopper.command == []

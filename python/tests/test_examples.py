@@ -13,7 +13,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples/python"
 
 
 def run(folder: Path, name: str, *words: str) -> list[str]:
-    command = [sys.executable, "-W", "error::UserWarning:marathon_envs", EXAMPLES / f"{name}.py", *words]
+    command = [sys.executable, "-W", "error::UserWarning:marathon_rl", EXAMPLES / f"{name}.py", *words]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from marathon_envs import MarathonAgent, Model, Simulation, VecEnv
+from marathon_rl import MarathonAgent, Model, Simulation, VecEnv
 
 ROWS, COLUMNS = 5, 7
 MODEL = f"""

@@ -13,15 +13,15 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatistics
 
-import marathon_envs
-from marathon_envs import MarathonEnv, MarathonVectorEnv
+import marathon_rl
+from marathon_rl import MarathonEnv, MarathonVectorEnv
 
-IDS = marathon_envs.ids()
+IDS = marathon_rl.ids()
 
 
 @pytest.mark.parametrize("id", IDS)
 def test_gymnasium_checks_every_task(id: str) -> None:
-    env = gymnasium.make(f"marathon_envs/{id}", render_mode="rgb_array", width=64, height=48)
+    env = gymnasium.make(f"marathon_rl/{id}", render_mode="rgb_array", width=64, height=48)
     assert isinstance(env.unwrapped, MarathonEnv)
     if id in gymnasium.registry:
         # Gymnasium's own tasks have unbounded observations, and a pendulum actions up to 3: its checker warns there too
@@ -40,19 +40,19 @@ def test_gymnasium_checks_every_task(id: str) -> None:
 
 
 def test_names_of_gymnasium() -> None:
-    names = {f"marathon_envs/{id}" for id in IDS}
+    names = {f"marathon_rl/{id}" for id in IDS}
     assert names <= set(gymnasium.registry)
-    env = gymnasium.make("marathon_envs:marathon_envs/Walker2d-v0")
-    assert env.spec is not None and env.spec.id == "marathon_envs/Walker2d-v0"
+    env = gymnasium.make("marathon_rl:marathon_rl/Walker2d-v0")
+    assert env.spec is not None and env.spec.id == "marathon_rl/Walker2d-v0"
     assert env.spec.make().spec == env.spec
-    vector = gymnasium.make_vec("marathon_envs/Walker2d-v1", num_envs=3)
+    vector = gymnasium.make_vec("marathon_rl/Walker2d-v1", num_envs=3)
     assert isinstance(vector, MarathonVectorEnv) and gymnasium.make_vec(vector.spec).num_envs == 3
     with pytest.raises(gymnasium.error.NameNotFound, match=r"Hopper-v\d"):
-        gymnasium.make("marathon_envs/Hoper-v0")
+        gymnasium.make("marathon_rl/Hoper-v0")
 
 
 def test_a_single_environment_is_agent_0_of_a_native_one() -> None:
-    env, native = MarathonEnv("ant"), marathon_envs.VecEnv("ant", 1, autoreset="disabled")
+    env, native = MarathonEnv("ant"), marathon_rl.VecEnv("ant", 1, autoreset="disabled")
     obs, info = env.reset(seed=5)
     assert np.array_equal(obs, native.reset(seed=5)[0]) and info["x_position"] == native.x_position[0]
     rng = np.random.default_rng(0)
@@ -79,14 +79,14 @@ def test_episodes_without_a_seed_differ() -> None:
 
 def test_time_limits() -> None:
     for limit in (None, 5):
-        env = gymnasium.make("marathon_envs/Hopper-v0", max_episode_steps=limit)
+        env = gymnasium.make("marathon_rl/Hopper-v0", max_episode_steps=limit)
         env.reset(seed=0)
         flags = [env.step(np.zeros(4))[2:4] for _ in range(5)]
         assert flags[-1] == (False, limit == 5)
     env = MarathonEnv("hopper", max_episode_steps=3)
     env.reset(seed=0)
     assert [env.step(np.zeros(4))[3] for _ in range(3)] == [False, False, True]
-    vector = gymnasium.make_vec("marathon_envs/Hopper-v0", num_envs=2, max_episode_steps=3)
+    vector = gymnasium.make_vec("marathon_rl/Hopper-v0", num_envs=2, max_episode_steps=3)
     vector.reset(seed=0)
     assert [vector.step(np.zeros((2, 4)))[3].tolist() for _ in range(4)] == [[False] * 2] * 2 + [
         [True] * 2,
@@ -115,7 +115,7 @@ def same(a: dict, b: dict, everywhere: np.ndarray) -> bool:
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 @pytest.mark.parametrize("id", ["Hopper-v0", "Ant-v1"])
 def test_many_agents_behave_as_gymnasiums_vector_of_single_ones(id: str, mode: AutoresetMode) -> None:
-    name, n, limit = f"marathon_envs/{id}", 5, 30
+    name, n, limit = f"marathon_rl/{id}", 5, 30
     ours = gymnasium.make_vec(name, num_envs=n, autoreset_mode=mode, max_episode_steps=limit)
     theirs = SyncVectorEnv([lambda: gymnasium.make(name, max_episode_steps=limit)] * n, autoreset_mode=mode)
     assert ours.metadata["autoreset_mode"] is mode
@@ -146,20 +146,20 @@ def test_many_agents_behave_as_gymnasiums_vector_of_single_ones(id: str, mode: A
 
 
 def test_steps_return_new_arrays_unless_told_otherwise() -> None:
-    envs = gymnasium.make_vec("marathon_envs/Hopper-v0", num_envs=4)
+    envs = gymnasium.make_vec("marathon_rl/Hopper-v0", num_envs=4)
     first, _ = envs.reset(seed=1)
     results = [first] + [x for _ in range(3) for x in envs.step(np.full((4, 4), 0.5))[:4]]
     kept = [x.copy() for x in results]
     envs.step(np.zeros((4, 4)))
     assert all(np.array_equal(x, old) for x, old in zip(results, kept, strict=True))
-    envs = gymnasium.make_vec("marathon_envs/Hopper-v0", num_envs=4, copy=False)
+    envs = gymnasium.make_vec("marathon_rl/Hopper-v0", num_envs=4, copy=False)
     first, _ = envs.reset(seed=1)
     assert envs.step(np.zeros((4, 4)))[0] is first
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
 def test_gymnasiums_wrappers_work(mode: AutoresetMode) -> None:
-    envs = gymnasium.make_vec("marathon_envs/Walker2d-v0", num_envs=6, autoreset_mode=mode, max_episode_steps=20)
+    envs = gymnasium.make_vec("marathon_rl/Walker2d-v0", num_envs=6, autoreset_mode=mode, max_episode_steps=20)
     if mode is AutoresetMode.NEXT_STEP:
         envs = NormalizeObservation(envs)
     envs = RecordEpisodeStatistics(envs)
@@ -174,7 +174,7 @@ def test_gymnasiums_wrappers_work(mode: AutoresetMode) -> None:
 
 def test_an_episode_that_ends_by_nonsense_says_so() -> None:
     nonsense = np.array([0.0, np.nan, 0.0, 0.0], np.float32)
-    env = gymnasium.make("marathon_envs/Hopper-v0")
+    env = gymnasium.make("marathon_rl/Hopper-v0")
     env.reset(seed=1)
     assert env.step(np.zeros(4, np.float32))[4]["diverged"] is False
     with pytest.warns(UserWarning, match="an action is not finite"):
@@ -195,8 +195,8 @@ def test_an_episode_that_ends_by_nonsense_says_so() -> None:
 
 
 def test_infos_without_dictionaries() -> None:
-    envs = gymnasium.make_vec("marathon_envs/Hopper-v0", num_envs=2, reward_terms=False, max_episode_steps=2)
-    env = gymnasium.make("marathon_envs/Hopper-v5", reward_terms=False)
+    envs = gymnasium.make_vec("marathon_rl/Hopper-v0", num_envs=2, reward_terms=False, max_episode_steps=2)
+    env = gymnasium.make("marathon_rl/Hopper-v5", reward_terms=False)
     assert "reward_terms" not in envs.reset(seed=1)[1] | env.reset(seed=1)[1]
     for _ in range(3):
         assert not any(isinstance(value, dict) for value in envs.step(np.zeros((2, 4)))[4].values())
@@ -207,7 +207,7 @@ def test_infos_without_dictionaries() -> None:
 AGAIN = [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))]  # noqa: S301
 
 
-class Worm(marathon_envs.MarathonAgent):
+class Worm(marathon_rl.MarathonAgent):
     """A class in place of a name."""
 
     mjcf = Path(__file__).parents[2] / "assets/agents/hopper.xml"
@@ -288,14 +288,14 @@ def test_masks_of_resets_are_checked() -> None:
 
 
 def test_pictures() -> None:
-    env = gymnasium.make("marathon_envs/Hopper-v0", render_mode="rgb_array", width=64, height=48)
+    env = gymnasium.make("marathon_rl/Hopper-v0", render_mode="rgb_array", width=64, height=48)
     env.reset(seed=1)
     first = env.render()
     assert first.shape == (48, 64, 3) and first.dtype == np.uint8 and first.std() > 10
     for _ in range(10):
         env.step(env.action_space.sample())
     assert not np.array_equal(env.render(), first)
-    envs = gymnasium.make_vec("marathon_envs/Hopper-v0", num_envs=2, render_mode="rgb_array", width=32, height=32)
+    envs = gymnasium.make_vec("marathon_rl/Hopper-v0", num_envs=2, render_mode="rgb_array", width=32, height=32)
     envs.reset(seed=1)
     assert [frame.shape for frame in envs.render()] == [(32, 32, 3)] * 2
     with pytest.raises(gymnasium.error.Error, match="a window shows one environment"):

@@ -8,10 +8,10 @@ import gymnasium
 import numpy as np
 import pytest
 
-import marathon_envs
-from marathon_envs import MarathonEnv, MarathonVectorEnv, VecEnv
+import marathon_rl
+from marathon_rl import MarathonEnv, MarathonVectorEnv, VecEnv
 
-IDS = [id for id in marathon_envs.ids() if id in gymnasium.registry]
+IDS = [id for id in marathon_rl.ids() if id in gymnasium.registry]
 KEYWORDS = {
     "Hopper-v5": {"ctrl_cost_weight": 0.1, "healthy_z_range": (0.6, float("inf")), "terminate_when_unhealthy": False},
     "Ant-v5": {"exclude_current_positions_from_observation": False, "include_cfrc_ext_in_observation": False},
@@ -25,7 +25,7 @@ def pair(id: str, **options) -> tuple[gymnasium.Env, gymnasium.Env]:
         warnings.simplefilter("ignore")
         theirs = gymnasium.make(id, **options)
     # double precision, as there
-    return gymnasium.make(f"marathon_envs/{id}", isa="f64", **options), theirs
+    return gymnasium.make(f"marathon_rl/{id}", isa="f64", **options), theirs
 
 
 def test_there_are_nine() -> None:
@@ -63,12 +63,12 @@ def test_keyword_arguments_are_checked() -> None:
         MarathonEnv("Hopper-v5", ctrl_cost_wait=1.0)
     with pytest.raises(ValueError, match="healthy_z_range"):
         VecEnv("Hopper-v5", healthy_z_range="high")
-    spec = marathon_envs.spec("Hopper-v5", ctrl_cost_weight=2)
+    spec = marathon_rl.spec("Hopper-v5", ctrl_cost_weight=2)
     assert spec.options["ctrl_cost_weight"] == 2.0 and spec.options["healthy_z_range"] == (0.7, np.inf)
 
 
 def test_many_agents_take_them_too() -> None:
-    envs = gymnasium.make_vec("marathon_envs/Ant-v5", num_envs=3, exclude_current_positions_from_observation=False)
+    envs = gymnasium.make_vec("marathon_rl/Ant-v5", num_envs=3, exclude_current_positions_from_observation=False)
     assert isinstance(envs, MarathonVectorEnv)
     obs, infos = envs.reset(seed=0)
     assert obs.shape == (3, 107) and obs.dtype == np.float64

@@ -5,15 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import marathon_envs
-from marathon_envs import judge
-from marathon_envs.judge import Judgment, Score
+import marathon_rl
+from marathon_rl import judge
+from marathon_rl.judge import Judgment, Score
 
 
 @pytest.mark.parametrize("task", ["Hopper-v5", "Walker2d-v5", "InvertedPendulum-v5", "InvertedDoublePendulum-v5"])
 def test_both_sides_agree_on_a_policy(task: str) -> None:
     # a feedback that keeps some of them up for a while
-    spec = marathon_envs.spec(task)
+    spec = marathon_rl.spec(task)
     gain = np.random.default_rng(3).normal(0, 0.1, (spec.obs_size, spec.act_size))
     verdict = judge.judge(task, lambda obs: np.clip(obs @ gain, -1, 1), episodes=20, here=100)
     assert len(verdict.gymnasium.returns) == 20
@@ -25,7 +25,7 @@ def test_both_sides_agree_on_a_policy(task: str) -> None:
 
 def test_a_trained_policy_is_judged_from_its_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "policy.safetensors"
-    marathon_envs.train("InvertedPendulum-v5", steps=200_000, agents=64, seed=1).policy.save(path)
+    marathon_rl.train("InvertedPendulum-v5", steps=200_000, agents=64, seed=1).policy.save(path)
     judge.main([str(path), "--episodes", "3", "--here", "16"])
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "InvertedPendulum-v5"

@@ -15,8 +15,8 @@ import pytest
 import torch
 from onnx import TensorProto, helper, numpy_helper
 
-import marathon_envs
-from marathon_envs import load_policy
+import marathon_rl
+from marathon_rl import load_policy
 
 ROOT = Path(__file__).parents[2]
 POLICIES = sorted((ROOT / "assets/policies").glob("*.safetensors"))
@@ -43,7 +43,7 @@ def test_an_exported_policy_acts_the_same(path: Path, tmp_path: Path) -> None:
     expected = policy(obs)
     np.testing.assert_allclose(run(file, obs, "deterministic_continuous_actions"), expected, atol=1e-5)
     # on states that matter, too
-    env = marathon_envs.VecEnv(policy.task, 64, **policy.meta.get("options", {}))
+    env = marathon_rl.VecEnv(policy.task, 64, **policy.meta.get("options", {}))
     obs = env.reset(seed=1)
     for _ in range(100):
         obs, *_ = env.step(policy(obs))
@@ -139,7 +139,7 @@ def test_a_policy_of_ml_agents_plays_here(tmp_path: Path) -> None:
     drawn = run(file, still, "continuous_actions")
     # the clip to [-3, 3] works on what is drawn there, and here: the spread is that of the file
     np.testing.assert_allclose(policy(still, rng=1).std(0), drawn.std(0), rtol=0.2, atol=0.02)
-    assert marathon_envs.evaluate(policy, 2)["episodes"] == 2
+    assert marathon_rl.evaluate(policy, 2)["episodes"] == 2
 
 
 class Scaled(torch.nn.Module):
@@ -194,7 +194,7 @@ def test_networks_of_pytorch_play_here(
 def test_policies_of_stable_baselines3_play_here(name: str, tmp_path: Path) -> None:
     import stable_baselines3  # noqa: PLC0415
 
-    env, file = marathon_envs.MarathonEnv("hopper"), tmp_path / "sb3.onnx"
+    env, file = marathon_rl.MarathonEnv("hopper"), tmp_path / "sb3.onnx"
     model = getattr(stable_baselines3, name)("MlpPolicy", env, seed=1, device="cpu")
 
     class Actor(torch.nn.Module):

@@ -18,8 +18,8 @@ import pytest
 import ray
 from ray.tune.registry import ENV_CREATOR, _global_registry
 
-import marathon_envs
-from marathon_envs.ray import Workers, register, train
+import marathon_rl
+from marathon_rl.ray import Workers, register, train
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "python"
 # 4096 steps per rollout
@@ -49,17 +49,17 @@ def cluster() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def want() -> marathon_envs.TrainResult:
-    return marathon_envs.train("hopper", **SMALL)
+def want() -> marathon_rl.TrainResult:
+    return marathon_rl.train("hopper", **SMALL)
 
 
-def same(a: marathon_envs.TrainResult, b: marathon_envs.TrainResult) -> bool:
+def same(a: marathon_rl.TrainResult, b: marathon_rl.TrainResult) -> bool:
     obs = np.random.default_rng(1).normal(size=(64, a.policy.obs_size)).astype(np.float32)
     return a.steps == b.steps and np.array_equal(a.policy(obs), b.policy(obs))
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_workers_do_not_change_the_policy(workers: int, want: marathon_envs.TrainResult) -> None:
+def test_workers_do_not_change_the_policy(workers: int, want: marathon_rl.TrainResult) -> None:
     rows: list[dict[str, Any]] = []
     got = train("hopper", workers=workers, callback=rows.append, **SMALL)
     assert same(got, want)
@@ -67,7 +67,7 @@ def test_workers_do_not_change_the_policy(workers: int, want: marathon_envs.Trai
     assert [row["iteration"] for row in rows] == [1, 2, 3, 4, 5]
 
 
-def test_killed_workers_change_nothing(want: marathon_envs.TrainResult) -> None:
+def test_killed_workers_change_nothing(want: marathon_rl.TrainResult) -> None:
     workers = Workers(2)
     killed = []
 
@@ -86,10 +86,10 @@ def test_killed_workers_change_nothing(want: marathon_envs.TrainResult) -> None:
     assert same(got, want)
 
 
-def test_a_run_goes_on_with_and_without_workers(tmp_path: Path, want: marathon_envs.TrainResult) -> None:
+def test_a_run_goes_on_with_and_without_workers(tmp_path: Path, want: marathon_rl.TrainResult) -> None:
     stop = {2: tmp_path / "there", 3: tmp_path / "here"}
     for iteration, out in stop.items():
-        begin, go_on = (train, marathon_envs.train) if iteration == 2 else (marathon_envs.train, train)
+        begin, go_on = (train, marathon_rl.train) if iteration == 2 else (marathon_rl.train, train)
         half = begin("hopper", out=out, callback=lambda row, last=iteration: row["iteration"] < last, **SMALL)
         assert half.interrupted
         assert same(go_on(resume=out), want)
@@ -110,15 +110,15 @@ def test_errors_of_a_worker_end_the_run() -> None:
 
 
 def test_workers_start_from_a_policy_as_a_run_on_one_machine_does(
-    tmp_path: Path, want: marathon_envs.TrainResult
+    tmp_path: Path, want: marathon_rl.TrainResult
 ) -> None:
     want.policy.save(tmp_path / "first.safetensors")
     short = {**SMALL, "steps": 2 * 4096, "initialize_from": tmp_path / "first.safetensors"}
-    assert same(train("hopper", **short), marathon_envs.train("hopper", **short))
+    assert same(train("hopper", **short), marathon_rl.train("hopper", **short))
 
 
 def test_it_takes_the_arguments_of_the_native_trainer() -> None:
-    native, own = (set(inspect.signature(f).parameters) for f in (marathon_envs.train, train))
+    native, own = (set(inspect.signature(f).parameters) for f in (marathon_rl.train, train))
     assert native - {"players"} == own - {"workers"}
 
 
@@ -126,7 +126,7 @@ def pid(actor: Any) -> int:
     return ray.get(actor.__ray_call__.remote(lambda _: os.getpid()))
 
 
-def test_a_worker_that_stops_answering_is_replaced(want: marathon_envs.TrainResult) -> None:
+def test_a_worker_that_stops_answering_is_replaced(want: marathon_rl.TrainResult) -> None:
     # a new process takes seconds to start, longer on a busy machine
     workers = Workers(2, answer_timeout=30)
     stopped = []
@@ -168,7 +168,7 @@ def test_a_run_whose_workers_do_not_answer_ends_with_an_error(tmp_path: Path) ->
         train("hopper", workers=workers, callback=stop, out=out, **SMALL)
     workers.close()
     # the trained policy is saved
-    assert marathon_envs.train(resume=out).steps == SMALL["steps"]
+    assert marathon_rl.train(resume=out).steps == SMALL["steps"]
     for wrong in (0, -1, float("inf"), float("nan")):
         with pytest.raises(ValueError, match="answer_timeout is"):
             Workers(1, answer_timeout=wrong)
@@ -176,9 +176,9 @@ def test_a_run_whose_workers_do_not_answer_ends_with_an_error(tmp_path: Path) ->
 
 def test_without_ray_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "ray", None)
-    monkeypatch.delitem(sys.modules, "marathon_envs.ray")
-    with pytest.raises(ImportError, match=r"pip install 'marathon-envs\[ray\]'"):
-        importlib.import_module("marathon_envs.ray")
+    monkeypatch.delitem(sys.modules, "marathon_rl.ray")
+    with pytest.raises(ImportError, match=r"pip install 'marathon-rl\[ray\]'"):
+        importlib.import_module("marathon_rl.ray")
 
 
 def test_the_example_ends_with_the_same_fingerprint_when_a_worker_is_killed() -> None:
@@ -195,9 +195,9 @@ def test_rllib_trains_on_the_environments() -> None:
 
 def test_rllib_passes_arguments_on() -> None:
     register()
-    create = _global_registry.get(ENV_CREATOR, "marathon_envs/Hopper-v5")
+    create = _global_registry.get(ENV_CREATOR, "marathon_rl/Hopper-v5")
     one, many = create({"ctrl_cost_weight": 0.5}), create({"num_envs": 3})
-    assert isinstance(one, marathon_envs.MarathonEnv)
+    assert isinstance(one, marathon_rl.MarathonEnv)
     assert one.task_spec.options["ctrl_cost_weight"] == 0.5
-    assert isinstance(many, marathon_envs.MarathonVectorEnv)
+    assert isinstance(many, marathon_rl.MarathonVectorEnv)
     assert many.num_envs == 3

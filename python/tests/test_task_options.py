@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import marathon_envs
-from marathon_envs import Clip, Model, VecEnv, evaluate, load_policy, spec, train
+import marathon_rl
+from marathon_rl import Clip, Model, VecEnv, evaluate, load_policy, spec, train
 
 WALK = Path(__file__).parents[2] / "assets" / "motions" / "marathon_man" / "walk.motion"
 SMALL = {"agents": 16, "seed": 5, "steps": 512, "threads": 1}
@@ -78,4 +78,4 @@ def test_wrong_arguments_are_refused_by_name() -> None:
     with pytest.raises(TypeError, match="clip"):
         train("MarathonMan-v0", options={"clp": "walk"}, **SMALL)
     with pytest.raises(ValueError, match="did you mean 'run'"):
-        marathon_envs.spec("MarathonMan-v0", clip="runn")
+        marathon_rl.spec("MarathonMan-v0", clip="runn")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from dm_control.utils import rewards
 
-from marathon_envs import Tolerance
+from marathon_rl import Tolerance
 
 NUMBERS = np.concatenate([np.linspace(-6, 6, 241), [-1e4, 1e4]])
 SIGMOIDS = ["gaussian", "hyperbolic", "long_tail", "reciprocal", "cosine", "linear", "quadratic", "tanh_squared"]

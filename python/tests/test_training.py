@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from arm import Arm
 
-import marathon_envs
-from marathon_envs import MarathonEnv, Policy, evaluate, load_policy, train
+import marathon_rl
+from marathon_rl import MarathonEnv, Policy, evaluate, load_policy, train
 
 ROOT = Path(__file__).parents[2]
 # 64 agents make 4096 steps per iteration
@@ -40,13 +40,13 @@ FOREIGN = {
 
 @pytest.fixture
 def obs() -> np.ndarray:
-    env = marathon_envs.VecEnv("hopper", 40)
+    env = marathon_rl.VecEnv("hopper", 40)
     return env.reset(seed=8).copy()
 
 
 def command(folder: Path, *words: str) -> str:
     """The console script, as pip makes it."""
-    code = "import sys; from marathon_envs._command import main; sys.argv[0] = 'marathon'; main()"
+    code = "import sys; from marathon_rl._command import main; sys.argv[0] = 'marathon'; main()"
     done = subprocess.run([sys.executable, "-c", code, *words], cwd=folder, capture_output=True, text=True, check=True)
     return done.stdout
 

@@ -13,10 +13,10 @@ import time
 import numpy as np
 import pytest
 
-import marathon_envs
-from marathon_envs import VecEnv
+import marathon_rl
+from marathon_rl import VecEnv
 
-IDS = marathon_envs.ids()
+IDS = marathon_rl.ids()
 
 
 def actions(env: VecEnv, seed: int = 0) -> np.ndarray:
@@ -29,7 +29,7 @@ def test_shapes_types_and_rewards(id: str) -> None:
     env = VecEnv(id, 37, threads=2)
     spec = env.spec
     assert (spec.id, env.num_envs, len(env), env.threads) == (id, 37, 37, 2)
-    assert spec.id == marathon_envs.spec(id).id and len(spec.action_names) == spec.act_size
+    assert spec.id == marathon_rl.spec(id).id and len(spec.action_names) == spec.act_size
     assert env.reset(seed=3).shape == (37, spec.obs_size)
     for step in range(30):
         obs, reward, terminated, truncated = env.step(actions(env, step))
@@ -221,7 +221,7 @@ def test_other_threads_run_while_it_steps() -> None:
         (lambda: ready().set_state(np.zeros(7), np.zeros(7)), r"qpos has the shape \(7,\), expected \(2, 7\)"),
         (lambda: ready().set_state(np.full((2, 7), np.nan), np.zeros((2, 7))), "the state of agent 0 is not finite"),
         (
-            lambda: marathon_envs.Renderer("hopper", 8, 8).render(np.zeros(7)),
+            lambda: marathon_rl.Renderer("hopper", 8, 8).render(np.zeros(7)),
             r"qpos has the shape \(7,\), expected \(1, 7\)",
         ),
         (lambda: VecEnv("hopper", 2).reset(mask=[True, False]), "the first reset must be of all agents"),
@@ -254,7 +254,7 @@ def test_arguments_of_a_wrong_type_are_named(wrong, message: str) -> None:
 
 
 def test_gymnasiums_names_work_too() -> None:
-    assert VecEnv("marathon_envs/Hopper-v0").spec.id == marathon_envs.spec("marathon_envs/Hopper-v0").id == "Hopper-v0"
+    assert VecEnv("marathon_rl/Hopper-v0").spec.id == marathon_rl.spec("marathon_rl/Hopper-v0").id == "Hopper-v0"
 
 
 def test_a_damaged_snapshot_is_refused() -> None:
@@ -323,7 +323,7 @@ def test_agents_can_differ_and_be_pushed() -> None:
 
 
 def test_facts_can_be_copied() -> None:
-    for facts in (VecEnv("Hopper-v5", max_episode_steps=7, frame_skip=2).spec, marathon_envs.spec("ant")):
+    for facts in (VecEnv("Hopper-v5", max_episode_steps=7, frame_skip=2).spec, marathon_rl.spec("ant")):
         for other in (copy.deepcopy(facts), pickle.loads(pickle.dumps(facts))):  # noqa: S301
             names = [name for name in dir(facts) if not name.startswith("_")]
             assert len(names) > 10 and all(getattr(other, name) == getattr(facts, name) for name in names)
@@ -353,10 +353,10 @@ def test_a_forked_process_steps_with_threads_of_its_own() -> None:
 
 def test_everything_is_explained_in_pythons_terms() -> None:
     explained = 0
-    for name in marathon_envs.__all__:
-        thing = getattr(marathon_envs, name)
+    for name in marathon_rl.__all__:
+        thing = getattr(marathon_rl, name)
         members = [thing] if callable(thing) else []
-        if getattr(thing, "__module__", "") == "marathon_envs" and isinstance(thing, type):
+        if getattr(thing, "__module__", "") == "marathon_rl" and isinstance(thing, type):
             members += [getattr(thing, member) for member in dir(thing) if not member.startswith("_")]
         for member in members:
             text = inspect.getdoc(member)

@@ -14,7 +14,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from marathon_envs import MarathonEnv
+from marathon_rl import MarathonEnv
 
 SCRIPT = """#!{python}
 import sys
@@ -49,7 +49,7 @@ def stand_in(folder: Path, monkeypatch: pytest.MonkeyPatch, nq: int, frames: int
 
 def test_every_state_is_sent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     log = stand_in(tmp_path, monkeypatch, nq=7)
-    env = gymnasium.make("marathon_envs/Hopper-v0", render_mode="human")
+    env = gymnasium.make("marathon_rl/Hopper-v0", render_mode="human")
     assert env.metadata["render_modes"] == ["rgb_array", "human"]
     expected, bare = [], env.unwrapped
     assert isinstance(bare, MarathonEnv)

@@ -15,7 +15,7 @@ use std::path::PathBuf;
 type Reduced<'py> = (Bound<'py, PyAny>, (String, Bound<'py, PyBytes>));
 
 /// A motion clip as a value of the option `clip`.
-#[pyclass(frozen, eq, module = "marathon_envs")]
+#[pyclass(frozen, eq, module = "marathon_rl")]
 #[derive(PartialEq)]
 pub struct Clip(NamedClip);
 
@@ -95,7 +95,7 @@ impl Clip {
 
     /// For `copy` and `pickle`: the bytes of a file.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
-        let make = py.import("marathon_envs._native")?.getattr("_clip")?;
+        let make = py.import("marathon_rl._native")?.getattr("_clip")?;
         Ok((make, (self.name().into(), PyBytes::new(py, &self.clip().to_bytes()))))
     }
 

@@ -1,7 +1,7 @@
-//! The native module `marathon_envs._native` of the Python package: environments stepped without the GIL on NumPy arrays
+//! The native module `marathon_rl._native` of the Python package: environments stepped without the GIL on NumPy arrays
 //! that are not copied, and the `marathon` command.
 //!
-//! `python/marathon_envs` documents the Python API; its `_native.pyi` also documents this module's classes.
+//! `python/marathon_rl` documents the Python API; its `_native.pyi` also documents this module's classes.
 //! Nothing here knows of Gymnasium or another framework.
 
 mod arrays;
@@ -23,7 +23,7 @@ mod vec_env;
 use pyo3::prelude::*;
 use std::ffi::OsString;
 
-/// Native part of marathon_envs.
+/// Native part of marathon_rl.
 #[pymodule]
 mod _native {
     #[pymodule_export]

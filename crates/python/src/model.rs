@@ -14,7 +14,7 @@ type Indices<'py> = Bound<'py, PyArray1<i64>>;
 
 /// A compiled MJCF model, the counterpart of MuJoCo's `MjModel`: SI units, radians, quaternions w x y z, body 0 is the
 /// world. Where the file gives no name, the name is empty.
-#[pyclass(frozen, module = "marathon_envs")]
+#[pyclass(frozen, module = "marathon_rl")]
 pub struct Model {
     pub(crate) inner: Arc<marathon_physics::Model>,
 }

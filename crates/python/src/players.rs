@@ -10,7 +10,7 @@ use pyo3::types::PyList;
 use std::sync::Mutex;
 
 /// Plays the agents of one slice of a training run, in a process of its own.
-#[pyclass(module = "marathon_envs")]
+#[pyclass(module = "marathon_rl")]
 pub struct Player {
     /// Behind a lock because a Python object may be dropped on any thread; never contended.
     player: Mutex<marathon_learn::Player>,

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 const MOST_AGENTS: usize = 1024;
 
 /// A trained policy: a function from observations to actions.
-#[pyclass(frozen, module = "marathon_envs")]
+#[pyclass(frozen, module = "marathon_rl")]
 pub struct Policy(pub marathon_learn::Policy);
 
 #[pymethods]
@@ -89,7 +89,7 @@ impl Policy {
 
     /// For `copy` and `pickle`: the bytes of a file.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
-        let make = py.import("marathon_envs._native")?.getattr("_policy")?;
+        let make = py.import("marathon_rl._native")?.getattr("_policy")?;
         Ok((make, (PyBytes::new(py, &self.0.to_bytes()),)))
     }
 

@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 /// Draws agents of one kind with the ray caster, followed by a camera. No window, no GPU.
-#[pyclass(module = "marathon_envs")]
+#[pyclass(module = "marathon_rl")]
 pub struct Renderer {
     scene: Scene,
     renderer: marathon_render::Renderer,

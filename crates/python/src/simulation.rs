@@ -36,7 +36,7 @@ const FRAMES: [Quantity; 6] = [
 ///
 /// Readings are read-only float64 arrays with one row per agent, in world axes and SI units. They are computed when they
 /// are first asked for after a step or a reset, and never overwritten.
-#[pyclass(module = "marathon_envs")]
+#[pyclass(module = "marathon_rl")]
 pub struct Simulation {
     /// Behind a lock because a Python object may be dropped on any thread; never contended.
     batch: Mutex<Batch>,

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PySlice};
 
 /// One number of an agent's command: its name, range and unit.
-#[pyclass(frozen, eq, get_all, module = "marathon_envs")]
+#[pyclass(frozen, eq, get_all, module = "marathon_rl")]
 #[derive(Clone, PartialEq)]
 pub struct CommandRange {
     /// Name, such as `velocity`.
@@ -45,7 +45,7 @@ impl CommandRange {
 }
 
 /// Constant facts of a task.
-#[pyclass(frozen, module = "marathon_envs")]
+#[pyclass(frozen, module = "marathon_rl")]
 pub struct Spec {
     /// Name in the registry, such as `Hopper-v0`.
     #[pyo3(get)]
@@ -127,7 +127,7 @@ impl Spec {
 
     /// For `copy` and `pickle`: what the facts follow from.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Arguments<'py>)> {
-        let make = py.import("marathon_envs._native")?.getattr("_spec")?;
+        let make = py.import("marathon_rl._native")?.getattr("_spec")?;
         Ok((make, (self.id.clone(), options::show(py, &self.options)?, self.max_episode_steps)))
     }
 

@@ -21,7 +21,7 @@ pub enum Task {
 }
 
 /// Gymnasium's namespace of the tasks, which may stand before a name.
-const NAMESPACE: &str = "marathon_envs/";
+const NAMESPACE: &str = "marathon_rl/";
 
 /// A task's name, without Gymnasium's namespace.
 pub fn plain(name: &str) -> &str {

@@ -35,7 +35,7 @@ fn config(value: &Bound<'_, PyAny>) -> PyResult<Option<Config>> {
 }
 
 /// Result of a run.
-#[pyclass(frozen, module = "marathon_envs")]
+#[pyclass(frozen, module = "marathon_rl")]
 pub struct TrainResult {
     /// The policy.
     #[pyo3(get)]
@@ -80,7 +80,7 @@ impl TrainResult {
 /// without, nothing is written. `resume`: the folder of a run to go on with, in place of a configuration; the task is needed
 /// for a class alone. `options`: arguments of a task with a name.
 /// `initialize_from`: a policy to start from in place of random weights, a file or the folder of a run, whose hidden layers are
-/// no wider; it may observe less. `players`: an object that has the rollouts played elsewhere, as `marathon_envs.ray.Workers` does.
+/// no wider; it may observe less. `players`: an object that has the rollouts played elsewhere, as `marathon_rl.ray.Workers` does.
 ///
 /// Ctrl-C and exceptions of the callback end training after the iteration; with a folder, what was learned is there and
 /// `resume` goes on with it. The same seed gives the same policy, bit for bit, for any number of threads.

@@ -25,7 +25,7 @@ type StepResult = (Py<PyAny>, Py<PyArray1<f32>>, Py<PyArray1<bool>>, Py<PyArray1
 /// Arrays are row-major with one row per agent. Without `copy`, the environment owns the arrays that it returns and
 /// overwrites them at the next step; with `copy`, every step returns new ones. Observations are computed in
 /// 32 bits, and written in 64 if `dtype` says so.
-#[pyclass(module = "marathon_envs")]
+#[pyclass(module = "marathon_rl")]
 pub struct VecEnv {
     /// Behind a lock because a Python object may be dropped on any thread; never contended.
     env: Mutex<marathon_envs::VecEnv>,

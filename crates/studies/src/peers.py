@@ -28,11 +28,11 @@ def cpu(who):
 
 
 def sb3(job):
-    import marathon_envs
+    import marathon_rl
     import numpy as np
     import stable_baselines3
     import torch
-    from marathon_envs.adapters.sb3 import Sb3VecEnv
+    from marathon_rl.adapters.sb3 import Sb3VecEnv
     from stable_baselines3.common.callbacks import BaseCallback
     from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
@@ -69,7 +69,7 @@ def sb3(job):
     wall, used = time.perf_counter() - start, time.process_time() - used
 
     # each agent plays one whole episode with the best actions
-    env = marathon_envs.VecEnv(job["agent"], job["episodes"], seed=1_000_003, threads=1, autoreset="disabled")
+    env = marathon_rl.VecEnv(job["agent"], job["episodes"], seed=1_000_003, threads=1, autoreset="disabled")
     spec, obs = env.spec, env.reset()
     alive = np.ones(job["episodes"], bool)
     returns, lengths, distance = (np.zeros(job["episodes"]) for _ in range(3))

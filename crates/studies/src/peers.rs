@@ -123,7 +123,7 @@ pub fn sb3(
         "episodes": EPISODES,
     });
     once(keep, (&format!("sb3-{}-{device}", algorithm.name()), seed), &job, || {
-        let advice = "pip install stable-baselines3 torch marathon-envs";
+        let advice = "pip install stable-baselines3 torch marathon-rl";
         let answer = trained(ask(&python::find(), VARIABLE, advice, &job)?)?;
         let eval = Evaluation {
             episodes: EPISODES as u64,

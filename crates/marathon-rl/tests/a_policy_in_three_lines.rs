@@ -1,6 +1,6 @@
 //! The builder trains the same policies as the command, writes only to given paths, and refuses unknown names.
 
-use marathon::prelude::*;
+use marathon_rl::prelude::*;
 
 #[test]
 fn a_run_without_a_folder_gives_the_policy_of_one_with_a_folder() {
@@ -47,7 +47,7 @@ fn a_stopped_run_is_resumed_to_the_same_bits() {
 
 #[test]
 fn what_does_not_exist_is_refused_with_the_nearest_name() {
-    let error = |result: marathon::Result<Outcome>| result.err().expect("an error").to_string();
+    let error = |result: marathon_rl::Result<Outcome>| result.err().expect("an error").to_string();
     let misspelled = Trainer::new("hoper").err().expect("an error").to_string();
     assert!(misspelled.contains("hoper") && misspelled.to_lowercase().contains("hopper-v0"), "{misspelled}");
     let wrong = error(Trainer::new("Hopper-v5").unwrap().option("ctrl_cost_wieght", 0.1).run());

@@ -2,7 +2,7 @@
 
 The tasks of the same names agree with Gymnasium's, so a policy should score the same on both sides:
 
-    $ python -m marathon_envs.judge runs/Hopper-v5-1
+    $ python -m marathon_rl.judge runs/Hopper-v5-1
     Hopper-v5
       marathon   3664 +- 3 (100 episodes, 0 falls)
       gymnasium  3661 +- 4 (20 episodes, 0 falls)
@@ -21,7 +21,7 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from marathon_envs._native import VecEnv, load_policy
+from marathon_rl._native import VecEnv, load_policy
 
 Array = npt.NDArray[Any]
 Act = Callable[[Array], Array]
@@ -134,7 +134,7 @@ def judge(task: str, act: Act, episodes: int = 20, *, here: int = 100, seed: int
     Args:
         task: a task that both have, such as `Hopper-v5`.
         act: the policy, a function of observations `(n, obs_size)` that returns actions `(n, act_size)`; a
-            `marathon_envs.Policy` is one.
+            `marathon_rl.Policy` is one.
         episodes: episodes in Gymnasium.
         here: episodes here, which cost little.
         seed: of the starts.
@@ -149,7 +149,7 @@ def _check(episodes: int) -> None:
 
 def main(words: Sequence[str] | None = None) -> None:
     """Judge the policies of a command line."""
-    parser = argparse.ArgumentParser("python -m marathon_envs.judge", description=str(__doc__).splitlines()[0])
+    parser = argparse.ArgumentParser("python -m marathon_rl.judge", description=str(__doc__).splitlines()[0])
     parser.add_argument("policies", nargs="+", metavar="POLICY", help="a policy file, or the folder of a run")
     parser.add_argument("--episodes", type=int, default=20, help="episodes in Gymnasium (default: 20)")
     parser.add_argument("--here", type=int, default=100, help="episodes here (default: 100)")

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from marathon_envs import _snapshots
-from marathon_envs._arrays import BoolArray, FloatArray, Streams
-from marathon_envs._native import CommandRange
-from marathon_envs.agents import MarathonAgent
+from marathon_rl import _snapshots
+from marathon_rl._arrays import BoolArray, FloatArray, Streams
+from marathon_rl._native import CommandRange
+from marathon_rl.agents import MarathonAgent
 
 LARGEST = 1e6
 """A coordinate or velocity beyond this is a broken simulation, though it may still be finite."""

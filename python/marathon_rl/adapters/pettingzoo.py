@@ -6,9 +6,9 @@ import gymnasium
 import numpy as np
 from pettingzoo import ParallelEnv
 
-from marathon_envs import _native, _spaces, _tasks
-from marathon_envs._spaces import FloatArray
-from marathon_envs._tasks import Task
+from marathon_rl import _native, _spaces, _tasks
+from marathon_rl._spaces import FloatArray
+from marathon_rl._tasks import Task
 
 PerAgent = dict[str, Any]
 

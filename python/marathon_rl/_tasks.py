@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from marathon_envs import _spaces
-from marathon_envs._native import Renderer, VecEnv, spec
-from marathon_envs.agent_env import AgentVecEnv
-from marathon_envs.agents import MarathonAgent
+from marathon_rl import _spaces
+from marathon_rl._native import Renderer, VecEnv, spec
+from marathon_rl.agent_env import AgentVecEnv
+from marathon_rl.agents import MarathonAgent
 
 Task = str | type[MarathonAgent]
 

@@ -9,10 +9,10 @@ import numpy.typing as npt
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from marathon_envs import _snapshots, _spaces, _tasks
-from marathon_envs._native import Renderer
-from marathon_envs._spaces import BoolArray, FloatArray
-from marathon_envs._tasks import Task
+from marathon_rl import _snapshots, _spaces, _tasks
+from marathon_rl._native import Renderer
+from marathon_rl._spaces import BoolArray, FloatArray
+from marathon_rl._tasks import Task
 
 Infos = dict[str, Any]
 
@@ -20,7 +20,7 @@ Infos = dict[str, Any]
 class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
     """Many agents with a task, stepped together by native threads.
 
-    `gymnasium.make_vec("marathon_envs/Hopper-v0", num_envs=1024)` makes it. Spaces and infos are those of
+    `gymnasium.make_vec("marathon_rl/Hopper-v0", num_envs=1024)` makes it. Spaces and infos are those of
     `MarathonEnv`, batched as Gymnasium batches them: `infos["x_velocity"]` is an array with a number for each agent,
     and `infos["_x_velocity"]` tells for which agents there is one.
 
@@ -62,7 +62,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         """Make an environment.
 
         Args:
-            task: name of the task, as in `marathon_envs.ids()`, or a `MarathonAgent` class.
+            task: name of the task, as in `marathon_rl.ids()`, or a `MarathonAgent` class.
             num_envs: number of agents.
             autoreset_mode: what happens to an agent whose episode ended.
             render_mode: None, or "rgb_array" for pictures of `width` x `height` pixels, one for each agent.
@@ -75,7 +75,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
             height: height of a picture, pixels.
             reward_terms: whether `infos` have the dictionary `reward_terms`. There are libraries that take no
                 dictionary within the infos.
-            **options: arguments of the task, see `marathon_envs.spec(task).options`.
+            **options: arguments of the task, see `marathon_rl.spec(task).options`.
         """
         _spaces.check_render_mode(render_mode, self.metadata)
         self.autoreset_mode = AutoresetMode(autoreset_mode)

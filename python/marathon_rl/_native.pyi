@@ -1,4 +1,4 @@
-"""Native part of marathon_envs."""
+"""Native part of marathon_rl."""
 
 from collections.abc import Callable, Sequence
 from os import PathLike
@@ -8,7 +8,7 @@ from typing import Any, Literal, Self, final
 import numpy as np
 import numpy.typing as npt
 
-from marathon_envs.agents import MarathonAgent
+from marathon_rl.agents import MarathonAgent
 
 __all__ = [
     "Clip",
@@ -188,7 +188,7 @@ class VecEnv:
         """Make an environment. The results depend on none of `threads`, `isa` (but for f64) and `copy`.
 
         Args:
-            id: name of the task, as in `marathon_envs.ids()`; case does not matter, and without a version it means v0.
+            id: name of the task, as in `marathon_rl.ids()`; case does not matter, and without a version it means v0.
             num_envs: number of agents. More than fit into 16 GB are a `MemoryError`, whose text says how to allow them.
             seed: seed until `reset` gives another. It is a number, not chance: without one given, every environment
                 begins with the same episodes.
@@ -452,7 +452,7 @@ def train(
         threads: number of threads; 0 means one per processor core.
         out: a new folder for everything that the command ``marathon train`` writes; None means that nothing is written.
         resume: the folder of a run to go on with, in place of a configuration; the task is needed for a class alone.
-        players: an object that has the rollouts played elsewhere, as `marathon_envs.ray.Workers` does.
+        players: an object that has the rollouts played elsewhere, as `marathon_rl.ray.Workers` does.
         options: arguments of a task with a name, such as ``{"clip": "my.bvh"}``. A clip may be a `Clip` or a list, too.
         initialize_from: a policy to start from in place of random weights, a file or the folder of a run, whose hidden
             layers are no wider; it may observe less.

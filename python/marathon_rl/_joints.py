@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from marathon_envs._arrays import FloatArray
-from marathon_envs._native import Model
+from marathon_rl._arrays import FloatArray
+from marathon_rl._native import Model
 
 
 class JointRotations:

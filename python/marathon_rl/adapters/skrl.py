@@ -7,8 +7,8 @@ import numpy as np
 import torch
 from skrl.envs.wrappers.torch.base import Wrapper
 
-from marathon_envs import _spaces, _tasks
-from marathon_envs._tasks import Task
+from marathon_rl import _spaces, _tasks
+from marathon_rl._tasks import Task
 
 
 class SkrlEnv(Wrapper):

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from marathon_envs._arrays import BoolArray, FloatArray
+from marathon_rl._arrays import BoolArray, FloatArray
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ import gymnasium
 import numpy as np
 
 if TYPE_CHECKING:
-    from marathon_envs._arrays import FloatArray
-    from marathon_envs._tasks import Task
+    from marathon_rl._arrays import FloatArray
+    from marathon_rl._tasks import Task
 
 #: Environment variable that names the program.
 VARIABLE = "MARATHON_GAME"

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 /// gives the same policy for any number of threads and any instruction set.
 ///
 /// ```no_run
-/// use marathon::prelude::*;
+/// use marathon_rl::prelude::*;
 ///
 /// let run = Trainer::new("Walker2d-v0")?
 ///     .steps(8_000_000)
@@ -26,7 +26,7 @@ use std::path::PathBuf;
 ///     })
 ///     .run()?;
 /// println!("{:?}", run.evaluation);
-/// # Ok::<(), marathon::Error>(())
+/// # Ok::<(), marathon_rl::Error>(())
 /// ```
 pub struct Trainer<'a> {
     /// `None` for a resumed run: its folder names the task.

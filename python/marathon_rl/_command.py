@@ -2,7 +2,7 @@
 
 import sys
 
-from marathon_envs._native import main as native_main
+from marathon_rl._native import main as native_main
 
 
 def main() -> None:

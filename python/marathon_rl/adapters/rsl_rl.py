@@ -7,8 +7,8 @@ import torch
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
-from marathon_envs import _spaces, _tasks
-from marathon_envs._tasks import Task
+from marathon_rl import _spaces, _tasks
+from marathon_rl._tasks import Task
 
 
 class RslRlEnv(VecEnv):
@@ -34,13 +34,13 @@ class RslRlEnv(VecEnv):
         """Make an environment and start the first episodes.
 
         Args:
-            task: name of the task, as in `marathon_envs.ids()`, or a `MarathonAgent` class.
+            task: name of the task, as in `marathon_rl.ids()`, or a `MarathonAgent` class.
             num_envs: number of agents.
             seed: seed of all random streams; None means a random one.
             device: where the tensors go.
             max_episode_steps: steps after which an episode ends by time; None means the task's own number.
             threads: number of threads, as in `VecEnv`.
-            **options: arguments of the task, see `marathon_envs.spec(task).options`.
+            **options: arguments of the task, see `marathon_rl.spec(task).options`.
         """
         # episodes are counted here, because runners may set `episode_length_buf`
         self._env = _tasks.vec_env(

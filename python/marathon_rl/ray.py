@@ -1,19 +1,19 @@
 """Training on many processes or machines with Ray, and the environments for RLlib.
 
-`train` is `marathon_envs.train` with its rollouts played by Ray's workers:
+`train` is `marathon_rl.train` with its rollouts played by Ray's workers:
 
-    >>> import marathon_envs.ray
-    >>> result = marathon_envs.ray.train("Humanoid-v5", workers=8)
+    >>> import marathon_rl.ray
+    >>> result = marathon_rl.ray.train("Humanoid-v5", workers=8)
 
 The policy has the bits of a run on one machine: it depends on the task, the configuration and the seed, not on the
 number of workers, nor on whether some of them were lost on the way.
 
 `register` makes every task known to RLlib:
 
-    >>> marathon_envs.ray.register()
-    >>> config = PPOConfig().environment("marathon_envs/Hopper-v5")
+    >>> marathon_rl.ray.register()
+    >>> config = PPOConfig().environment("marathon_rl/Hopper-v5")
 
-Needs Ray: `pip install marathon-envs[ray]`, for RLlib `pip install marathon-envs[rllib]`.
+Needs Ray: `pip install marathon-rl[ray]`, for RLlib `pip install marathon-rl[rllib]`.
 """
 
 import time
@@ -25,17 +25,17 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from marathon_envs import registration
-from marathon_envs._native import Player, TrainResult, ids
-from marathon_envs._native import train as native_train
-from marathon_envs.env import MarathonEnv
-from marathon_envs.vector import MarathonVectorEnv
+from marathon_rl import registration
+from marathon_rl._native import Player, TrainResult, ids
+from marathon_rl._native import train as native_train
+from marathon_rl.env import MarathonEnv
+from marathon_rl.vector import MarathonVectorEnv
 
 try:
     import ray
     from ray.exceptions import RayError, RayTaskError
 except ImportError as error:
-    raise ImportError("marathon_envs.ray needs Ray, which is not here: pip install 'marathon-envs[ray]'") from error
+    raise ImportError("marathon_rl.ray needs Ray, which is not here: pip install 'marathon-rl[ray]'") from error
 
 __all__ = ["Workers", "register", "train"]
 
@@ -169,7 +169,7 @@ def train(
     options: dict[str, Any] | None = None,
     initialize_from: str | PathLike[str] | None = None,
 ) -> TrainResult:
-    """Train as `marathon_envs.train` does, with rollouts played by Ray's workers; the policy has the same bits.
+    """Train as `marathon_rl.train` does, with rollouts played by Ray's workers; the policy has the same bits.
 
     Connect to a cluster with `ray.init(address=...)` before; otherwise Ray starts one on this machine. The package must
     be installed on the machines of the cluster, in the same version.
@@ -179,7 +179,7 @@ def train(
         config: a file, or a dictionary with the same keys, such as `{"ppo": {"lr": 3e-4}}`; the task's preset holds for
             what it leaves out.
         workers: number of workers, or prepared `Workers`, which are left open.
-        callback: called after every iteration with its numbers, as in `marathon_envs.train`.
+        callback: called after every iteration with its numbers, as in `marathon_rl.train`.
         seed: seed of everything random.
         steps: steps of all agents together.
         agents: agents that act side by side, a multiple of 16. Many of them make up for the time that messages take.
@@ -213,7 +213,7 @@ def train(
 
 
 def register() -> None:
-    """Make every task known to RLlib as `marathon_envs/<id>`, as to Gymnasium.
+    """Make every task known to RLlib as `marathon_rl/<id>`, as to Gymnasium.
 
     `env_config` has arguments of the environment, such as `{"ctrl_cost_weight": 0.01}` for `Hopper-v5`. With
     `env_runners(num_envs_per_env_runner=N, gym_env_vectorize_mode="vector_entry_point")`, an env runner steps its N
@@ -222,7 +222,7 @@ def register() -> None:
     try:
         from ray.tune.registry import register_env  # noqa: PLC0415
     except ImportError as error:
-        raise ImportError("RLlib is not here: pip install 'marathon-envs[rllib]'") from error
+        raise ImportError("RLlib is not here: pip install 'marathon-rl[rllib]'") from error
     for task in ids():
         register_env(f"{registration.NAMESPACE}/{task}", _creator(task))
 

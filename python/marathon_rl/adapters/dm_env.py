@@ -6,9 +6,9 @@ import dm_env
 import numpy as np
 from dm_env import specs
 
-from marathon_envs import _spaces, _tasks
-from marathon_envs._spaces import FloatArray
-from marathon_envs._tasks import Task
+from marathon_rl import _spaces, _tasks
+from marathon_rl._spaces import FloatArray
+from marathon_rl._tasks import Task
 
 
 class DmEnv(dm_env.Environment):
@@ -23,10 +23,10 @@ class DmEnv(dm_env.Environment):
         """Make an environment.
 
         Args:
-            task: name of the task, as in `marathon_envs.ids()`, or a `MarathonAgent` class.
+            task: name of the task, as in `marathon_rl.ids()`, or a `MarathonAgent` class.
             seed: seed of the episodes; None means a random one.
             max_episode_steps: steps after which an episode ends by time; None means the task's own number, -1 never.
-            **options: arguments of the task, see `marathon_envs.spec(task).options`.
+            **options: arguments of the task, see `marathon_rl.spec(task).options`.
         """
         limit = _spaces.steps_limit(max_episode_steps, None)
         self._env = _tasks.vec_env(

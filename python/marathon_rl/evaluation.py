@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from marathon_envs import _native, _tasks
-from marathon_envs._native import Policy
-from marathon_envs._tasks import Task
+from marathon_rl import _native, _tasks
+from marathon_rl._native import Policy
+from marathon_rl._tasks import Task
 
 # most agents that play side by side, and the default seed: those of the native evaluation
 MOST_AGENTS = 1024

@@ -6,10 +6,10 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from marathon_envs import _snapshots, _spaces, _tasks, _window
-from marathon_envs._native import Renderer
-from marathon_envs._spaces import FloatArray
-from marathon_envs._tasks import Task
+from marathon_rl import _snapshots, _spaces, _tasks, _window
+from marathon_rl._native import Renderer
+from marathon_rl._spaces import FloatArray
+from marathon_rl._tasks import Task
 
 
 class _Metadata:
@@ -23,7 +23,7 @@ class _Metadata:
 class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
     """One agent with a task.
 
-    `gymnasium.make("marathon_envs/Hopper-v0")` makes it with Gymnasium's time limit; on its own, its episodes end only
+    `gymnasium.make("marathon_rl/Hopper-v0")` makes it with Gymnasium's time limit; on its own, its episodes end only
     where the agent fails, unless `max_episode_steps` is given.
 
     An observation is `(obs_size,)`; its parts and units are on the task's page in the documentation. An action is
@@ -56,7 +56,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         """Make an environment.
 
         Args:
-            task: name of the task, as in `marathon_envs.ids()`, or a `MarathonAgent` class.
+            task: name of the task, as in `marathon_rl.ids()`, or a `MarathonAgent` class.
             render_mode: None; "rgb_array" for pictures of `width` x `height` pixels; or "human" for a window of the
                 game, with which steps take the time that they simulate. The program `marathon-game` is looked up on
                 the search path, or where the environment variable MARATHON_GAME says; if it is not there,
@@ -67,7 +67,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
             height: height of a picture, pixels.
             reward_terms: whether `info` has the dictionary `reward_terms`. There are libraries that take no dictionary
                 within the infos.
-            **options: arguments of the task, see `marathon_envs.spec(task).options`.
+            **options: arguments of the task, see `marathon_rl.spec(task).options`.
         """
         _spaces.check_render_mode(render_mode, {"render_modes": ["rgb_array", "human"]})
         limit = _spaces.steps_limit(max_episode_steps, _spaces.NEVER)

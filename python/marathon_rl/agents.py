@@ -17,14 +17,14 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from marathon_envs._arrays import BoolArray, FloatArray, Streams
-from marathon_envs._joints import JointRotations
-from marathon_envs._native import CommandRange, Model, Simulation
+from marathon_rl._arrays import BoolArray, FloatArray, Streams
+from marathon_rl._joints import JointRotations
+from marathon_rl._native import CommandRange, Model, Simulation
 
 if TYPE_CHECKING:
-    from marathon_envs.agent_env import AgentVecEnv
-    from marathon_envs.env import MarathonEnv
-    from marathon_envs.vector import MarathonVectorEnv
+    from marathon_rl.agent_env import AgentVecEnv
+    from marathon_rl.env import MarathonEnv
+    from marathon_rl.vector import MarathonVectorEnv
 
 MAX_SPEED = 4.0
 """Speed in m/s that `MarathonAgent.velocity` calls 1."""
@@ -415,7 +415,7 @@ class MarathonAgent:
     @classmethod
     def vec_env(cls, num_envs: int = 1, **options: Any) -> AgentVecEnv:
         """Many agents with the interface of the native `VecEnv`; the options are its own."""
-        from marathon_envs.agent_env import AgentVecEnv  # noqa: PLC0415 (it imports this module)
+        from marathon_rl.agent_env import AgentVecEnv  # noqa: PLC0415 (it imports this module)
 
         return AgentVecEnv(cls, num_envs, **options)
 
@@ -425,14 +425,14 @@ class MarathonAgent:
 
         As `gymnasium.make` would, it truncates episodes after `max_episode_steps`.
         """
-        from marathon_envs.env import MarathonEnv  # noqa: PLC0415
+        from marathon_rl.env import MarathonEnv  # noqa: PLC0415
 
         return MarathonEnv(cls, **{"max_episode_steps": cls.max_episode_steps, **options})
 
     @classmethod
     def make_vec(cls, num_envs: int = 1, **options: Any) -> MarathonVectorEnv:
         """Many agents as a Gymnasium vector environment; the options are those of `MarathonVectorEnv`."""
-        from marathon_envs.vector import MarathonVectorEnv  # noqa: PLC0415
+        from marathon_rl.vector import MarathonVectorEnv  # noqa: PLC0415
 
         return MarathonVectorEnv(cls, num_envs, **options)
 

@@ -3,27 +3,27 @@
 `VecEnv` is the native vector environment: NumPy arrays in, NumPy arrays out, nothing copied, no GIL while it steps.
 `ids` lists the tasks, `spec` tells the facts of one.
 
-    >>> import numpy as np, marathon_envs
-    >>> env = marathon_envs.VecEnv("Hopper-v0", num_envs=1024)
+    >>> import numpy as np, marathon_rl
+    >>> env = marathon_rl.VecEnv("Hopper-v0", num_envs=1024)
     >>> obs = env.reset(seed=1)
     >>> obs, reward, terminated, truncated = env.step(np.zeros((1024, 4), np.float32))
 
-The import registers every task with Gymnasium in the namespace `marathon_envs`:
+The import registers every task with Gymnasium in the namespace `marathon_rl`:
 
     >>> import gymnasium
-    >>> env = gymnasium.make("marathon_envs/Hopper-v0")
-    >>> envs = gymnasium.make_vec("marathon_envs/Hopper-v0", num_envs=1024)
+    >>> env = gymnasium.make("marathon_rl/Hopper-v0")
+    >>> envs = gymnasium.make_vec("marathon_rl/Hopper-v0", num_envs=1024)
 
 `train` is the native trainer, `load_policy` reads what it has learned, `evaluate` tells how good that is:
 
-    >>> result = marathon_envs.train("Hopper-v0", callback=lambda metrics: print(metrics["return_mean"]))
+    >>> result = marathon_rl.train("Hopper-v0", callback=lambda metrics: print(metrics["return_mean"]))
     >>> actions = result.policy(obs)
 
 `MarathonAgent` is what one subclasses to write an agent in Python, `Simulation` the bare physics of a `Model`.
 """
 
-from marathon_envs import registration
-from marathon_envs._native import (
+from marathon_rl import registration
+from marathon_rl._native import (
     Clip,
     CommandRange,
     Model,
@@ -39,11 +39,11 @@ from marathon_envs._native import (
     spec,
     train,
 )
-from marathon_envs.agents import MarathonAgent, ResetNoise
-from marathon_envs.env import MarathonEnv
-from marathon_envs.evaluation import evaluate
-from marathon_envs.tolerance import Tolerance
-from marathon_envs.vector import MarathonVectorEnv
+from marathon_rl.agents import MarathonAgent, ResetNoise
+from marathon_rl.env import MarathonEnv
+from marathon_rl.evaluation import evaluate
+from marathon_rl.tolerance import Tolerance
+from marathon_rl.vector import MarathonVectorEnv
 
 __all__ = [
     "Clip",

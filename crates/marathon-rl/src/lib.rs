@@ -6,17 +6,17 @@
 //! Train a hopper and save its policy:
 //!
 //! ```no_run
-//! use marathon::prelude::*;
+//! use marathon_rl::prelude::*;
 //!
 //! let run = Trainer::new("hopper")?.steps(4_000_000).run()?;
 //! run.policy.save("hopper.safetensors".as_ref())?;
-//! # Ok::<(), marathon::Error>(())
+//! # Ok::<(), marathon_rl::Error>(())
 //! ```
 //!
 //! Step 1,000 hoppers:
 //!
 //! ```
-//! use marathon::prelude::*;
+//! use marathon_rl::prelude::*;
 //!
 //! let mut env = VecEnv::new("hopper", &VecEnvOptions { agents: 1000, ..Default::default() })?;
 //! let mut step = env.buffers();
@@ -25,7 +25,7 @@
 //! for _ in 0..1000 {
 //!     env.step(&actions, &mut step)?;
 //! }
-//! # Ok::<(), marathon::Error>(())
+//! # Ok::<(), marathon_rl::Error>(())
 //! ```
 //!
 //! `marathon list` prints the tasks. To add one, implement [`Agent`](envs::Agent) and [`register`](envs::register) it.

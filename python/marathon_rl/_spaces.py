@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 
-from marathon_envs._native import Spec
-from marathon_envs.agent_env import AgentSpec
+from marathon_rl._native import Spec
+from marathon_rl.agent_env import AgentSpec
 
 FloatArray = npt.NDArray[Any]
 BoolArray = npt.NDArray[np.bool_]

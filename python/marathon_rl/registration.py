@@ -3,21 +3,21 @@
 import gymnasium
 from gymnasium.envs.registration import registry
 
-from marathon_envs._native import ids, spec
+from marathon_rl._native import ids, spec
 
-NAMESPACE = "marathon_envs"
+NAMESPACE = "marathon_rl"
 
 
 def register() -> None:
-    """Register every task as `marathon_envs/<id>`, for `gymnasium.make` and `gymnasium.make_vec`."""
+    """Register every task as `marathon_rl/<id>`, for `gymnasium.make` and `gymnasium.make_vec`."""
     for task in ids():
         name = f"{NAMESPACE}/{task}"
         if name in registry:
             continue
         gymnasium.register(
             id=name,
-            entry_point="marathon_envs.env:MarathonEnv",
-            vector_entry_point="marathon_envs.vector:MarathonVectorEnv",
+            entry_point="marathon_rl.env:MarathonEnv",
+            vector_entry_point="marathon_rl.vector:MarathonVectorEnv",
             max_episode_steps=spec(task).max_episode_steps,
             kwargs={"task": task},
         )

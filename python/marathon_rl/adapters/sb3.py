@@ -8,10 +8,10 @@ import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
-from marathon_envs import _native, _spaces, _tasks
-from marathon_envs._spaces import FloatArray
-from marathon_envs._tasks import Task
-from marathon_envs.registration import NAMESPACE
+from marathon_rl import _native, _spaces, _tasks
+from marathon_rl._spaces import FloatArray
+from marathon_rl._tasks import Task
+from marathon_rl.registration import NAMESPACE
 
 
 class Sb3VecEnv(VecEnv):
