@@ -11,21 +11,21 @@ use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
 Examples:
-  marathon train hopper                         learn to hop; results go to runs/hopper-1
-  marathon train MarathonMan --option clip=my.bvh   learn to move as in a recording
-  marathon train hopper --set ppo.lr=3e-4       the same with another task_config; `marathon config show hopper` has all
-  marathon train hopper --algo acktr            the same by another algorithm: ppo, a2c, acktr
-  marathon render runs/hopper-1 --out hop.gif   see it
-  marathon eval runs/hopper-1 --episodes 1000   measure it
-  marathon train --resume runs/hopper-1 --steps 20000000   let it learn on
-  marathon export runs/hopper-1                 for Unity, ONNX Runtime and others
-  marathon play runs/hopper-1                   watch it in a window, push it
-  marathon list                                 all agents
-  marathon bench physics                        how fast this computer is
+  marathon train hopper                            train, evaluate and record a hopper; results go to runs/hopper-1
+  marathon train hopper --set ppo.lr=3e-4          change a setting; `marathon config show hopper` lists all settings
+  marathon train hopper --algo sac                 use another algorithm: ppo, a2c, acktr or sac
+  marathon train MarathonMan --option clip=my.bvh  imitate a recording
+  marathon train --resume runs/hopper-1 --steps 20M    continue a run
+  marathon render runs/hopper-1 --out hop.gif      record a video
+  marathon eval runs/hopper-1 --episodes 1000      measure a policy
+  marathon export runs/hopper-1                    write an ONNX file
+  marathon play runs/hopper-1                      watch it in a window, push it
+  marathon list                                    list all tasks
+  marathon doctor                                  check this computer
 
-Everything random comes from the seed: the same command gives the same policy, bit for bit, on any number of threads.";
+All random numbers come from the seed: the same command gives the same policy, bit for bit, on any number of threads.";
 
-/// Active-ragdoll locomotion: train, evaluate and show agents that learn to run.
+/// Train, evaluate and show active-ragdoll characters.
 #[derive(Debug, Parser)]
 #[command(name = "marathon", version, about, after_help = EXAMPLES, arg_required_else_help = true)]
 pub struct Args {
@@ -40,72 +40,86 @@ pub struct Args {
 /// Command to run.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Learn a policy and evaluate it.
+    /// Train a policy and evaluate it.
     Train(TrainArgs),
-    /// Learn from policies: one that does what several do.
+    /// Distill several policies into one.
     Distill(DistillArgs),
-    /// Average policies that a run has kept: the mean can be better than each of them.
+    /// Average the policies that a run has kept; the average is often better than each of them.
     Average(AverageArgs),
-    /// Play whole episodes with a policy's best actions and report how it did.
+    /// Play whole episodes with a policy's mean actions, and report returns, lengths and falls.
     Eval(EvalArgs),
-    /// Draw a policy in action: a strip of frames, an animation or a film.
+    /// Record a policy in action: a strip of frames, an animation or a video.
     Render(RenderArgs),
-    /// Write a policy as ONNX, for Unity ML-Agents, ONNX Runtime and others.
+    /// Write a policy as an ONNX file, in the layout of ML-Agents.
     Export(ExportArgs),
-    /// Turn an ONNX network of another trainer into a policy, or a policy into one for other options.
+    /// Convert an ONNX network of another trainer to a policy, or rewrite a policy for other options.
     Import(ImportArgs),
-    /// Record a policy's decisions for ML-Agents' imitation learning: a .demo file.
+    /// Record demonstrations for ML-Agents' imitation learning (.demo).
     RecordDemo(RecordDemoArgs),
-    /// Open the game: watch, push and teach characters in a window.
+    /// Open the game: watch, steer, push and train characters in a window.
     Play(PlayArgs),
-    /// List the agents, or tell all about one.
+    /// List all tasks, or describe one.
     List {
-        /// Agent to tell about: the parts of its observation, its rewards, commands and options.
+        /// Task to describe: its observation, rewards, commands and options.
         agent: Option<String>,
     },
-    /// Show the settings that a task is trained with, or convert a file of ML-Agents.
+    /// Show the training settings of a task, or convert a configuration of ML-Agents.
     #[command(subcommand)]
     Config(ConfigCommand),
-    /// Make motion capture a character's own: read, retarget, check and draw clips.
+    /// Import, retarget, check and render motion clips.
     Motion(MotionArgs),
-    /// Measure the speed of the physics, the environments or the training.
+    /// Measure the speed of physics, environments and training.
     Bench(BenchArgs),
-    /// Play rollouts for `train --processes`, which starts this.
+    /// Inspect this computer: processor, instruction set, speed, Python, ffmpeg, game, and what is missing.
+    Doctor,
+    /// Print a completion script, such as `marathon completions bash > ~/.local/share/bash-completion/completions/marathon`.
+    Completions {
+        /// Shell.
+        shell: clap_complete::Shell,
+    },
+    /// Collect rollouts for `train --processes`, which starts this command.
     #[command(hide = true)]
     RolloutWorker,
 }
 
 const TRAIN_HELP: &str = "\
 The run's folder holds:
-  policy.safetensors      the policy, all that is needed to act
+  policy.safetensors      the policy, complete with normalization and options
   summary.json            steps, seconds and the evaluation
-  progress.csv            one row per iteration
+  progress.csv            one row for each iteration
   events.out.tfevents.*   the same for TensorBoard
-  curve.png               return and speed against steps
-  run.json                agent and configuration
-  checkpoint/             what --resume goes on from
-  policies/               policies on the way there
+  curve.png               return and speed over steps
+  TASK.gif                a video of the result, such as hopper.gif
+  run.json                task and configuration
+  checkpoint/             state for --resume
+  policies/               policies saved during training
 
-Ctrl-C finishes the iteration, writes everything and tells how to resume; the exit code is then 130.
-A resumed run gives the same policy, bit for bit, as one that was never interrupted.";
+Ctrl-C finishes the iteration, writes everything and prints the command that resumes; the exit code is then 130. \
+A resumed run gives the same policy, bit for bit, as an uninterrupted one.";
 
 /// Options of `train`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = TRAIN_HELP)]
 pub struct TrainArgs {
-    /// Agent to train, such as hopper, walker, humanoid, ant or Hopper-v1; see `marathon list`.
+    /// Task to train, such as hopper, walker, ant, humanoid or Hopper-v5; see `marathon list`.
     #[arg(required_unless_present = "resume")]
     pub agent: Option<String>,
     #[command(flatten)]
     pub run: RunOptions,
+    /// Record a video of the result, TASK.gif in the run's folder [default: in a terminal].
+    #[arg(long, conflicts_with = "no_video")]
+    pub video: bool,
+    /// Record no video.
+    #[arg(long)]
+    pub no_video: bool,
 }
 
 /// Subcommands of `config`.
 #[derive(Debug, Subcommand)]
 pub enum ConfigCommand {
-    /// Print all settings of a task as YAML: its preset, or what a file and `--set` make of it.
+    /// Print all settings of a task as YAML: its preset, changed by a file and by `--set`.
     Show(ShowArgs),
-    /// Print a file of ML-Agents as one of Marathon's, with notes on what differs.
+    /// Convert a configuration of ML-Agents to Marathon's format, with notes on differences.
     Convert(ConvertArgs),
 }
 
@@ -114,13 +128,13 @@ pub enum ConfigCommand {
 pub struct ShowArgs {
     /// Task, such as hopper; see `marathon list`.
     pub task: String,
-    /// Configuration, Marathon's own or ML-Agents' [default: the task's preset].
+    /// Configuration file of Marathon or ML-Agents [default: the task's preset].
     #[arg(long, value_name = "F.yaml", conflicts_with = "algo")]
     pub config: Option<PathBuf>,
-    /// Algorithm, with the settings that it starts from in place of the task's preset.
+    /// Algorithm, with its default settings instead of the task's preset.
     #[arg(long, value_name = "NAME", value_parser = Algorithm::NAMES)]
     pub algo: Option<String>,
-    /// TaskConfig that differs, such as `ppo.lr=3e-4`; may be repeated.
+    /// Setting to change, such as `ppo.lr=3e-4`; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
 }
@@ -128,7 +142,7 @@ pub struct ShowArgs {
 /// Options of `config convert`.
 #[derive(Debug, clap::Args)]
 pub struct ConvertArgs {
-    /// Configuration of ML-Agents: today's (`behaviors:`) or one of ML-Agents 0.x.
+    /// Configuration of ML-Agents: the present format (`behaviors:`) or that of ML-Agents 0.x.
     #[arg(value_name = "IN.yaml")]
     pub file: PathBuf,
     /// File to write, .yaml [default: print it].
@@ -137,12 +151,12 @@ pub struct ConvertArgs {
 }
 
 const DISTILL_HELP: &str = "\
-Each teacher has agents of its own. The student plays, the teachers say what they would do where it gets to, and it
-learns that. If the agent takes a clip, a teacher's agents follow the clip that the teacher follows. A teacher may observe
-less than the student: the parts of its observation are looked up by their names.
+Each teacher has its own agents. The student acts in them, and learns the actions that the teacher would have taken. If \
+the task has clips, the agents of a teacher follow the clip of that teacher. A teacher may observe less than the \
+student: parts of the observation are matched by name.
 
-Ctrl-C finishes the round and writes the policy as it is. The same command goes on from FILE.unfinished, which is also
-written every minute, with the bits of a distillation that was never interrupted.
+Ctrl-C finishes the round and writes the present policy. The same command continues from FILE.unfinished, which is also \
+written every minute. The result is bit-identical to an uninterrupted distillation.
 
   marathon distill MarathonMan --option future=3 --out all.safetensors \\
       --teacher runs/marathon_man_walk-1 --teacher runs/marathon_man_jump-1";
@@ -151,11 +165,11 @@ written every minute, with the bits of a distillation that was never interrupted
 #[derive(Debug, clap::Args)]
 #[command(after_help = DISTILL_HELP)]
 pub struct DistillArgs {
-    /// Agent that the policy is for; see `marathon list`.
+    /// Task of the new policy; see `marathon list`.
     pub agent: String,
     #[command(flatten)]
     pub task: TaskOptions,
-    /// Policy to learn from, a file or the folder of a run; may be repeated. One that is named twice has twice the agents.
+    /// Policy to learn from: a file or the folder of a run. May be repeated; a policy named twice gets twice the agents.
     #[arg(long = "teacher", value_name = "POLICY", required = true)]
     pub teachers: Vec<PathBuf>,
     /// File to write, .safetensors or .onnx.
@@ -166,8 +180,8 @@ pub struct DistillArgs {
 }
 
 const AVERAGE_HELP: &str = "\
-Steps of learning are noisy to the end, and the mean of what they lead to is less so. Policies must be near each other, as
-those that one run has kept in policies/. Policies of runs with different beginnings have no useful mean.
+Averaging the last policies of a run reduces the noise of training. The policies must be close to each other, such as \
+those in policies/ of one run. The average of independent runs is useless.
 
   marathon average runs/marathon_man_steer-1 --out mean.safetensors";
 
@@ -175,7 +189,7 @@ those that one run has kept in policies/. Policies of runs with different beginn
 #[derive(Debug, clap::Args)]
 #[command(after_help = AVERAGE_HELP)]
 pub struct AverageArgs {
-    /// Policy files; the folder of a run stands for all policies that the run has kept.
+    /// Policy files. The folder of a run means all policies that the run has kept.
     #[arg(value_name = "POLICY", required = true)]
     pub policies: Vec<PathBuf>,
     #[command(flatten)]
@@ -190,13 +204,13 @@ pub struct AverageArgs {
 pub struct EvalArgs {
     #[command(flatten)]
     pub source: PolicySource,
-    /// Episodes to play.
+    /// Number of episodes.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     pub episodes: u64,
     /// Seed of the environments.
     #[arg(long, value_name = "S", default_value_t = marathon_learn::EvalOptions::default().seed)]
     pub seed: u64,
-    /// Threads; 0 means one per processor. The result does not depend on it.
+    /// Number of threads; 0 means one per core. The result does not depend on it.
     #[arg(long, value_name = "T", default_value_t = 0)]
     pub threads: usize,
 }
@@ -206,12 +220,12 @@ pub struct EvalArgs {
 pub struct RenderArgs {
     #[command(flatten)]
     pub source: PolicySource,
-    /// Picture to write: .png is a strip of frames, .gif an animation, .mp4 a film (needs ffmpeg).
+    /// File to write: .png for a strip of frames, .gif for an animation, .mp4 for a video (needs ffmpeg).
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     #[command(flatten)]
     pub film: FilmOptions,
-    /// Frames of a .png strip [default: 8].
+    /// Number of frames of a .png strip [default: 8].
     #[arg(long, value_name = "N")]
     pub frames: Option<usize>,
     /// Width of a frame, pixels [default: 240 for .png, 480 for .gif, 960 for .mp4].
@@ -220,10 +234,10 @@ pub struct RenderArgs {
     /// Height of a frame, pixels [default: 4/3 of the width for .png, 9/16 otherwise].
     #[arg(long, value_name = "PIXELS")]
     pub height: Option<usize>,
-    /// Agents side by side.
+    /// Number of agents, side by side.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub agents: usize,
-    /// The clip that the agents follow, drawn as their ghost: inside them, or beside.
+    /// Draw the reference clip as a ghost: inside the agent, or beside it.
     #[arg(long, value_name = "WHERE", num_args = 0..=1, default_missing_value = "inside")]
     pub ghost: Option<Ghost>,
     /// Seed of the environments.
@@ -232,27 +246,26 @@ pub struct RenderArgs {
 }
 
 const EXPORT_HELP: &str = "\
-The file follows the contract of ML-Agents' models: input obs_0 [batch, obs], the raw observation; outputs
-deterministic_continuous_actions and continuous_actions [batch, act]; version_number, memory_size and
-continuous_action_output_shape. Normalization and bounds are inside.";
+The file has the inputs and outputs of ML-Agents' models: input obs_0 [batch, obs], the raw observation; outputs \
+deterministic_continuous_actions and continuous_actions [batch, act]; version_number, memory_size and \
+continuous_action_output_shape. It includes normalization and action bounds.";
 
 /// Options of `export`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXPORT_HELP)]
 pub struct ExportArgs {
-    /// Policy file, or folder of a run.
+    /// Policy file or folder of a run.
     pub policy: PathBuf,
-    /// File to write [default: beside the policy, .onnx].
+    /// File to write [default: the policy's name with .onnx].
     #[arg(long, value_name = "F.onnx")]
     pub out: Option<PathBuf>,
 }
 
 const IMPORT_HELP: &str = "\
-Reads multi-layer perceptrons with one observation as input and actions as output, as ML-Agents, PyTorch and
-Stable-Baselines3 write them: normalization, layers with swish, tanh, elu or relu, a final tanh, bounds.
-`eval` and `render` take such files as they are.
+Reads multi-layer perceptrons from one observation to actions, as ML-Agents, PyTorch and Stable-Baselines3 export \
+them: normalization, layers with swish, tanh, elu or relu, a final tanh, bounds. `eval` and `render` also take such files.
 
-A policy of Marathon is written again for the options that are given, and with a checksum if it has none:
+A policy of Marathon is rewritten for the given options, and gets a checksum if it has none:
 
   marathon import runs/marathon_man_steer-1 --option start=first --out steer.safetensors
   marathon import old.safetensors --out new.safetensors";
@@ -261,15 +274,15 @@ A policy of Marathon is written again for the options that are given, and with a
 #[derive(Debug, clap::Args)]
 #[command(after_help = IMPORT_HELP)]
 pub struct ImportArgs {
-    /// Network to read, or a policy file, or the folder of a run.
+    /// ONNX network, policy file or folder of a run.
     #[arg(value_name = "NETWORK")]
     pub network: PathBuf,
-    /// Agent that it is for [default: the one that the file names, if Marathon has written it].
+    /// Task of the policy [default: the task that the file names].
     #[arg(long, value_name = "AGENT")]
     pub agent: Option<String>,
     #[command(flatten)]
     pub task: TaskOptions,
-    /// File to write [default: beside a network, .safetensors].
+    /// File to write [default: the network's name with .safetensors].
     #[arg(long, value_name = "F.safetensors")]
     pub out: Option<PathBuf>,
 }
@@ -279,10 +292,10 @@ pub struct ImportArgs {
 pub struct RecordDemoArgs {
     #[command(flatten)]
     pub source: PolicySource,
-    /// File to write; its name ends in .demo.
+    /// File to write (.demo).
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Episodes to record.
+    /// Number of episodes to record.
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     pub episodes: u64,
     /// Seed of the environments.

@@ -114,7 +114,6 @@ impl Shot {
 /// If a ghost is requested but the agents follow no clip, or the picture cannot be written.
 pub fn shoot(policies: &[Policy], spec: &Spec, shot: &Shot, cast: &Cast, out: &Path) -> Result<Report, CliError> {
     shot.check()?;
-    interrupt::install("leaving without a picture")?;
     let mut stage = Stage::new(policies, spec, cast)?;
     let lanes = if cast.ghost == Some(Ghost::Beside) { 2 * cast.agents } else { cast.agents };
     let renderer = Renderer::new(shot.width, shot.height)?;

@@ -2,7 +2,7 @@
 
 use marathon_physics::SimError;
 use marathon_physics::budget::OverBudget;
-use marathon_physics::hint::listed;
+use marathon_physics::hint::{did_you_mean, listed};
 use marathon_physics::mjcf::MjcfError;
 use thiserror::Error;
 
@@ -10,14 +10,16 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum EnvError {
     /// No agent of this name is registered.
-    #[error("agent '{name}' does not exist{}", listed(.nearest.as_ref(), known))]
+    #[error("agent '{name}' does not exist{}; the most similar of {count}: {similar}", did_you_mean(.nearest.as_ref()))]
     UnknownAgent {
         /// The requested name.
         name: String,
         /// The closest registered name, if any is close.
         nearest: Option<String>,
-        /// All registered names, comma separated.
-        known: String,
+        /// The most similar registered names, comma separated.
+        similar: String,
+        /// Number of registered names.
+        count: usize,
     },
     /// The name is registered already.
     #[error("agent '{id}' is registered already; give the new one another id, such as '{suggestion}'")]

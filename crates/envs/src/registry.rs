@@ -5,7 +5,7 @@
 
 use std::sync::{Arc, LazyLock, PoisonError, RwLock};
 
-use marathon_physics::hint::nearest;
+use marathon_physics::hint::{nearest, similar};
 use marathon_physics::lanes::Isa;
 
 use crate::agent::Options;
@@ -13,6 +13,9 @@ use crate::agents;
 use crate::any_agent::AnyAgent;
 use crate::error::EnvError;
 use crate::shard::{AgentShards, ShardFactory};
+
+/// Number of similar names in an error.
+const SIMILAR: usize = 5;
 
 /// Agents by name.
 #[derive(Clone)]
@@ -76,7 +79,8 @@ impl Registry {
                 let base = nearest(name, bases.iter().copied())?;
                 bases.iter().position(|b| *b == base).map(|i| ids[i])
             });
-            EnvError::UnknownAgent { name: name.into(), nearest: near.map(Into::into), known: ids.join(", ") }
+            let similar = similar(name, ids.iter().copied(), SIMILAR).join(", ");
+            EnvError::UnknownAgent { name: name.into(), nearest: near.map(Into::into), similar, count: ids.len() }
         })
     }
 

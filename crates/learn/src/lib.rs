@@ -68,7 +68,7 @@ pub use algorithms::acktr::Acktr;
 pub use algorithms::actor_critic::ActionStd;
 pub use algorithms::ppo::Ppo;
 pub use algorithms::sac::Sac;
-pub use algorithms::schedule::{LrSchedule, Schedule};
+pub use algorithms::schedule::{LrSchedule, Progress, Schedule};
 pub use distill::{Distiller, Halfway, Lessons};
 pub use error::Error;
 pub use files::{AtomicFile, checksum, read_description, write_atomic, write_description};

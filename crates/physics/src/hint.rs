@@ -1,9 +1,10 @@
 //! Suggestions for unknown names in errors: the nearest known name, and all known names.
 
+/// Length of the longest names that are compared: comparing takes quadratic time, and longer names are not typos.
+const LONGEST: usize = 200;
+
 /// The known name closest to `name`, ignoring case, if it is close enough to be a typo. The first of several.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    // comparing takes quadratic time, and names this long are not typos
-    const LONGEST: usize = 200;
     if name.is_empty() || name.len() > LONGEST {
         return None;
     }
@@ -15,6 +16,15 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .filter(|(distance, known)| *distance <= 2.max(known.chars().count() / 3))
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, known)| known)
+}
+
+/// The `count` known names that are most like `name`, ignoring case, the best first.
+pub fn similar<'a>(name: &str, known: impl IntoIterator<Item = &'a str>, count: usize) -> Vec<&'a str> {
+    let name: String = name.to_lowercase().chars().take(LONGEST).collect();
+    let mut scored: Vec<(f64, &str)> =
+        known.into_iter().map(|known| (strsim::jaro_winkler(&name, &known.to_lowercase()), known)).collect();
+    scored.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+    scored.into_iter().take(count).map(|(_, known)| known).collect()
 }
 
 /// `"; did you mean 'hip'?"`, or an empty text without a name.
@@ -44,6 +54,13 @@ mod tests {
         let near = |name| nearest(name, known);
         assert_eq!([near("hpi"), near("knee"), near("ankle_lfet")], [Some("hip"), Some("Knee"), Some("ankle_left")]);
         assert_eq!([near(""), near("shoulder"), near(&"hip".repeat(100))], [None; 3]);
+    }
+
+    #[test]
+    fn similar_names_come_best_first() {
+        let known = ["ankle_left", "hip", "Hip_left", "knee"];
+        assert_eq!(similar("hipp", known, 2), ["hip", "Hip_left"]);
+        assert_eq!(similar(&"x".repeat(1000), known, 9).len(), 4);
     }
 
     #[test]

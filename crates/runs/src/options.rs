@@ -14,22 +14,22 @@ use std::sync::Arc;
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct LearnOptions {
-    /// Configuration, Marathon's own or ML-Agents'. The task's preset holds for what Marathon's own leaves out [default: the preset].
+    /// Configuration file of Marathon or ML-Agents. A file of Marathon changes the task's preset [default: the preset].
     #[cfg_attr(feature = "clap", arg(long, value_name = "F.yaml"))]
     pub config: Option<PathBuf>,
-    /// Algorithm, with the settings that it starts from in place of the task's preset.
+    /// Algorithm, with its default settings instead of the task's preset.
     #[cfg_attr(feature = "clap", arg(long, value_name = "NAME", value_parser = Algorithm::NAMES))]
     pub algo: Option<String>,
-    /// TaskConfig that differs from the configuration, such as `ppo.lr=3e-4`; may be repeated. `marathon config show TASK` lists them.
+    /// Setting to change, such as `ppo.lr=3e-4`; may be repeated. `marathon config show TASK` lists them.
     #[cfg_attr(feature = "clap", arg(long, value_name = "KEY=VALUE"))]
     pub set: Vec<String>,
-    /// Agent-steps of the whole run; short for `--set run.total_steps=N`.
+    /// Steps of all agents together; short for `--set run.total_steps=N`.
     #[cfg_attr(feature = "clap", arg(long, value_name = "N", value_parser = parse_steps))]
     pub steps: Option<u64>,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     #[cfg_attr(feature = "clap", arg(long, value_name = "S"))]
     pub seed: Option<u64>,
-    /// Threads; 0 means one per processor. The result does not depend on it.
+    /// Number of threads; 0 means one per core. The result does not depend on it.
     #[cfg_attr(feature = "clap", arg(long, value_name = "T"))]
     pub threads: Option<usize>,
 }
@@ -41,30 +41,30 @@ pub struct RunOptions {
     /// How the policy is learned.
     #[cfg_attr(feature = "clap", command(flatten))]
     pub learn: LearnOptions,
-    /// Arguments of the task.
+    /// Options of the task.
     #[cfg_attr(feature = "clap", command(flatten))]
     pub task: TaskOptions,
-    /// Agents that act side by side: a multiple of 16, or 1, 2, 4 or 8, which cost as much as 16.
+    /// Number of agents: a multiple of 16, or 1, 2, 4 or 8, which cost as much as 16.
     #[cfg_attr(feature = "clap", arg(long, value_name = "N"))]
     pub agents: Option<usize>,
-    /// Processes that play, each with a share of the agents, while this one learns; 0: it plays itself, on its threads. The
-    /// result does not depend on it. Not with sac.
+    /// Number of processes that collect rollouts; 0 means that this process does. The result does not depend on it. Not
+    /// for sac.
     #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = 0))]
     pub processes: usize,
-    /// Policy to start from in place of random weights, a file or the folder of a run, whose hidden layers are no wider.
-    /// It may observe less: the parts of its observation are looked up by their names, and what else there is has no influence at first.
+    /// Policy to start from instead of random weights: a file or the folder of a run, with hidden layers that are at most as
+    /// wide. Observations are matched by name; new observations start with zero weight.
     #[cfg_attr(feature = "clap", arg(long, value_name = "POLICY"))]
     pub initialize_from: Option<PathBuf>,
-    /// Folder for the results, new or empty [default: runs/AGENT-N].
+    /// Folder for the results, new or empty [default: runs/TASK-N].
     #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
     pub out: Option<PathBuf>,
-    /// Go on with the run in this folder; more steps extend it.
+    /// Resume the run in this folder; with a larger `--steps`, extend it.
     #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
     pub resume: Option<PathBuf>,
 }
 
 impl LearnOptions {
-    /// Refuses options that do not go together.
+    /// Refuses options that exclude each other.
     ///
     /// # Errors
     /// If there is no such algorithm, or a configuration beside it, which names its own.
@@ -82,7 +82,7 @@ impl LearnOptions {
 }
 
 impl RunOptions {
-    /// Refuses options that do not go together.
+    /// Refuses options that exclude each other.
     ///
     /// # Errors
     /// As [`LearnOptions::validate`], or if an option of new runs stands beside `resume`.
@@ -105,16 +105,16 @@ impl RunOptions {
     }
 }
 
-/// A policy, and the agent that it is to move.
+/// A policy and its task.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct PolicySource {
-    /// Policy file, .safetensors or .onnx, or folder of a run.
+    /// Policy file (.safetensors or .onnx) or folder of a run.
     pub policy: PathBuf,
-    /// Agent that the policy must be for [default: the one it was trained for].
+    /// Task of the policy [default: the task that it was trained for].
     #[cfg_attr(feature = "clap", arg(long, value_name = "AGENT"))]
     pub agent: Option<String>,
-    /// Arguments of the task; the others are those that the policy was trained with.
+    /// Options of the task that differ from those of the policy's training.
     #[cfg_attr(feature = "clap", command(flatten))]
     pub task: TaskOptions,
 }
@@ -137,28 +137,28 @@ impl PolicySource {
     }
 }
 
-/// Time of a film.
+/// Length and frame rate of a video.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct FilmOptions {
-    /// Length of the film [default: 8, and 2 for a strip of frames].
+    /// Length of the video, s [default: 8; 2 for a strip of frames].
     #[cfg_attr(feature = "clap", arg(long, value_name = "S", allow_negative_numbers = true))]
     pub seconds: Option<f64>,
-    /// Seconds that pass before the film begins.
+    /// Simulated time before the video starts, s.
     #[cfg_attr(feature = "clap", arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true))]
     pub start: f64,
-    /// Frames per second of a film [default: 25 for .gif, 50 for .mp4, and 30 in the game].
+    /// Frames per second of a video [default: 25 for .gif, 50 for .mp4, 30 in the game].
     #[cfg_attr(feature = "clap", arg(long, value_name = "N", allow_negative_numbers = true))]
     pub fps: Option<f64>,
 }
 
 impl FilmOptions {
-    /// Most frames per second.
+    /// Highest frame rate, frames per second.
     pub const MOST_FPS: f64 = 1000.0;
-    /// Fewest frames per second. A film has one frame at least, however long that is.
+    /// Lowest frame rate, frames per second. A video has at least one frame.
     pub const LEAST_FPS: f64 = 0.1;
 
-    /// Refuses times that no film has.
+    /// Refuses lengths and frame rates that make no video.
     ///
     /// # Errors
     /// Names the option, its value and what was expected.

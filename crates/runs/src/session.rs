@@ -18,11 +18,12 @@ use crate::text::{thousands, whole};
 use marathon_config::Loaded;
 use marathon_envs::ShardFactory;
 use marathon_learn::{
-    Checkpoint, EvalOptions, Evaluation, IterationStats, Observer, Players, Policy, Snapshot, TrainOutput,
-    evaluate_roles, initialized, train_with,
+    Checkpoint, EvalOptions, Evaluation, IterationStats, Observer, Players, Policy, Progress, Schedule, Snapshot,
+    TrainConfig, TrainOutput, evaluate_roles, initialized, train_with,
 };
 use marathon_physics::budget;
 use marathon_physics::lanes::Isa;
+use serde_json::Value;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -85,7 +86,7 @@ impl Session {
         options.validate()?;
         match (&options.resume, task) {
             (Some(_), _) if loaded.is_some() => Err(RunError::NewRunOnly { name: "config" }),
-            (Some(path), task) => Ok((Self::resume(task, options, path)?, Vec::new())),
+            (Some(path), task) => Self::resume(task, options, path),
             (None, Some(task)) => Self::begin(task, options, loaded, dry),
             (None, None) => Err(RunError::option("task", "is missing, expected a task or a run to resume")),
         }
@@ -140,7 +141,7 @@ impl Session {
         Ok((Session { run, folder, factory, task_config, checkpoint }, loaded.notes))
     }
 
-    fn resume(task: Option<Task<'_>>, options: &RunOptions, path: &Path) -> Result<Self, RunError> {
+    fn resume(task: Option<Task<'_>>, options: &RunOptions, path: &Path) -> Result<(Self, Vec<String>), RunError> {
         let learn = &options.learn;
         let (folder, mut run) = RunFolder::open(path)?;
         let task = match task {
@@ -159,11 +160,13 @@ impl Session {
         }
         let done = checkpoint.as_ref().map_or(0, Checkpoint::steps);
 
+        let mut notes = Vec::new();
         if let Some(steps) = learn.steps {
             if steps < done {
                 let problem = format!("is {}, but {} steps are done", thousands(steps), thousands(done));
                 return Err(RunError::option("steps", problem));
             }
+            notes.extend(stretched(&run.config, done, steps));
             run.config.run.total_steps = steps;
         }
         run.config.validate()?;
@@ -175,7 +178,7 @@ impl Session {
         let factory = with_demonstrations(factory, &run.config)?;
         folder.write_run(&run)?;
         let checkpoint = checkpoint.map_or_else(|| start_from(&run, &*factory), |last| Ok(Some(last)))?;
-        Ok(Session { folder: Some(folder), run, factory, task_config, checkpoint })
+        Ok((Session { folder: Some(folder), run, factory, task_config, checkpoint }, notes))
     }
 
     /// Number of agent-steps done before.
@@ -308,4 +311,38 @@ fn stopped(folder: &RunFolder, cause: RunError, saved: bool, steps: u64) -> RunE
         false => Checkpoint::load(&folder.checkpoint()).ok().map(|old| old.steps()),
     };
     RunError::Stopped { cause: Box::new(cause), folder: folder.path().into(), steps, saved }
+}
+
+/// Schedules that jump when a run that has made some of its steps gets another length: they span the whole run.
+fn stretched(config: &TrainConfig, done: u64, steps: u64) -> Option<String> {
+    let mut moves = Vec::new();
+    let at = |total: u64| Progress { iteration: 0, steps: done, total_steps: total };
+    let value = serde_json::to_value(config).unwrap_or_default();
+    walk(&value, "", &mut |key, schedule| {
+        let [was, is] = [config.run.total_steps, steps].map(|total| at(total).at(schedule));
+        if (was - is).abs() > 1e-3 * was.abs() {
+            moves.push(format!("{key} from {} to {}", rounded(was), rounded(is)));
+        }
+    });
+    (done > 0 && !moves.is_empty()).then(|| {
+        let list = moves.join(", ");
+        format!("the schedules span the new length, so they change now: {list}; the return may drop at first")
+    })
+}
+
+fn rounded(x: f64) -> f64 {
+    format!("{x:.2e}").parse().unwrap_or(x)
+}
+
+/// Calls `each` with the key and value of every schedule in a configuration.
+fn walk(value: &Value, key: &str, each: &mut impl FnMut(&str, Schedule)) {
+    let Value::Object(map) = value else { return };
+    if let (2, Some(from), Some(to)) =
+        (map.len(), map.get("from").and_then(Value::as_f64), map.get("to").and_then(Value::as_f64))
+    {
+        return each(key, Schedule { from, to });
+    }
+    for (name, inner) in map {
+        walk(inner, &if key.is_empty() { name.clone() } else { format!("{key}.{name}") }, each);
+    }
 }

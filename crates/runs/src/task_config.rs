@@ -26,8 +26,8 @@ const XML: &str = "xml_file";
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct TaskOptions {
-    /// Argument of the task, such as `clip=run`, `clip=my.bvh` or `start=first`; may be repeated. `marathon list AGENT` tells
-    /// which there are.
+    /// Option of the task, such as `clip=run`, `clip=my.bvh` or `start=first`; may be repeated. `marathon list TASK` lists
+    /// them.
     #[cfg_attr(feature = "clap", arg(long = "option", value_name = "NAME=VALUE", value_parser = parse_option))]
     pub given: Vec<(String, Value)>,
 }

@@ -1,9 +1,11 @@
 //! One file per command.
 
 pub mod average;
+pub mod completions;
 pub mod config;
 pub mod convert;
 pub mod distill;
+pub mod doctor;
 pub mod eval;
 pub mod list;
 pub mod play;

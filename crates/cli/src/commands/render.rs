@@ -5,8 +5,9 @@ use crate::error::CliError;
 use crate::film::{Cast, Shot, shoot};
 use marathon_physics::budget::MEMORY;
 use marathon_render::Format;
-use marathon_runs::output;
-use marathon_runs::terminal::{print_json, say};
+use marathon_runs::terminal::{interrupt, print_json, say};
+use marathon_runs::{PolicySource, output};
+use std::path::Path;
 
 /// Memory per pixel while a frame is drawn, bytes.
 const PIXEL: f64 = 4.0;
@@ -22,6 +23,7 @@ pub fn run(args: &RenderArgs, json: bool) -> Result<(), CliError> {
     output::check(&args.out, &["png", "gif", "mp4"], &[&args.source.policy])?;
     let (policies, factory) = args.source.load_all()?;
     let cast = Cast { agents: args.agents, seed: args.seed, start: args.film.start, ghost: args.ghost };
+    interrupt::install("leaving without a picture")?;
     let report = shoot(&policies, factory.spec(), &shot, &cast, &args.out)?;
     if json {
         print_json(&report);
@@ -29,6 +31,19 @@ pub fn run(args: &RenderArgs, json: bool) -> Result<(), CliError> {
         say(report.line());
     }
     Ok(())
+}
+
+/// Records a short video of the policy in a run's folder. Returns a line about it.
+///
+/// # Errors
+/// If the policy cannot be read or the video cannot be written.
+pub fn preview(folder: &Path, out: &Path) -> Result<String, CliError> {
+    let source = PolicySource { policy: folder.into(), ..PolicySource::default() };
+    let (policies, factory) = source.load_all()?;
+    let shot = Shot { format: Format::Gif, width: 400, height: 224, length: 6.0, frames: 1, fps: 25.0 };
+    let seed = marathon_learn::EvalOptions::default().seed;
+    let cast = Cast { agents: 1, seed, start: 0.0, ghost: None };
+    Ok(shoot(&policies, factory.spec(), &shot, &cast, out)?.line())
 }
 
 fn shot(args: &RenderArgs) -> Result<Shot, CliError> {

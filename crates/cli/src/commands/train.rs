@@ -1,6 +1,7 @@
 //! `marathon train`: from a configuration to a folder with a policy.
 
 use crate::args::TrainArgs;
+use crate::commands::render;
 use crate::error::CliError;
 use crate::program::{self, resume_command};
 use marathon_learn::{Control, IterationStats, Players};
@@ -9,6 +10,7 @@ use marathon_runs::processes::Processes;
 use marathon_runs::report::summary::{EPISODES, evaluation_table};
 use marathon_runs::terminal::{self, interrupt, print_json, say};
 use marathon_runs::{Session, Task, text};
+use std::io::IsTerminal;
 
 /// Trains, evaluates, writes everything.
 ///
@@ -67,7 +69,13 @@ pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
     say(evaluation_table(&eval, spec.max_episode_steps, spec.dt));
     outcome.summary.imitation.iter().for_each(|clip| say(clip.table()));
     say(format!("\nwritten to {path}: policy.safetensors, summary.json, progress.csv, curve.png, TensorBoard events"));
-    say(format!("see it by    {program} render {path} --out {}.gif", text::short_name(&agent)));
+    let name = format!("{}.gif", text::short_name(&agent));
+    if args.video || (!args.no_video && std::io::stdout().is_terminal()) {
+        let video = outcome.summary.folder.join(name);
+        say(format!("video        {}", render::preview(&outcome.summary.folder, &video)?));
+    } else {
+        say(format!("watch it:    {program} render {path} --out {name}"));
+    }
     Ok(())
 }
 

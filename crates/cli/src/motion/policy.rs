@@ -8,7 +8,7 @@ use marathon_envs::registry;
 use marathon_learn::{EvalOptions, PolicyMeta};
 use marathon_motion::{About, Clip};
 use marathon_render::Format;
-use marathon_runs::terminal::{print_json, say};
+use marathon_runs::terminal::{interrupt, print_json, say};
 use marathon_runs::text::path_word;
 use marathon_runs::{PolicySource, TaskOptions, policy_file};
 use std::path::Path;
@@ -25,6 +25,7 @@ pub fn render(args: &RenderArgs, policy: &Path, json: bool) -> Result<(), CliErr
     let (policy, factory) = PolicySource { policy: policy.into(), agent: None, task }.load()?;
     let ghost = Some(args.ghost.unwrap_or(Ghost::Inside));
     let cast = Cast { agents: 1, seed: EvalOptions::default().seed, start: 0.0, ghost };
+    interrupt::install("leaving without a picture")?;
     let report = shoot(&[policy], factory.spec(), &shot, &cast, &args.out)?;
     if json {
         print_json(&report);

@@ -1,0 +1,154 @@
+//! `marathon doctor`: what this computer offers, and what is missing for each part of Marathon.
+
+use crate::commands::play;
+use crate::error::CliError;
+use marathon_physics::lanes::Isa;
+use marathon_physics::{Batch, BatchOptions};
+use marathon_runs::python;
+use marathon_runs::terminal::{print_json, say};
+use serde::Serialize;
+use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+/// Physics steps of one agent between two looks at the clock.
+const STEPS: usize = 20;
+/// Time of the speed measurement.
+const MEASURE: Duration = Duration::from_millis(300);
+
+/// A part of the computer.
+#[derive(Serialize)]
+struct Finding {
+    name: &'static str,
+    found: String,
+    /// The parts of Marathon that need it, and how to get it. Empty if nothing is missing.
+    missing: String,
+}
+
+/// Inspects the computer and prints the findings.
+///
+/// # Errors
+/// If the built-in model cannot be simulated, which would be a defect.
+pub fn run(json: bool) -> Result<(), CliError> {
+    let findings = [
+        finding(
+            "Marathon",
+            format!("{} for {}-{}", env!("CARGO_PKG_VERSION"), std::env::consts::ARCH, std::env::consts::OS),
+        ),
+        finding("processor", processor()),
+        instruction_sets(),
+        finding("speed", speed()?),
+        python_of_tests(),
+        program(
+            "ffmpeg",
+            &["-version"],
+            "videos as .mp4 need it: https://ffmpeg.org, or `apt install ffmpeg`; .gif and .png do not",
+        ),
+        game(),
+        graphics(),
+    ];
+    if json {
+        print_json(&serde_json::json!({ "findings": findings }));
+        return Ok(());
+    }
+    let width = findings.iter().map(|finding| finding.name.len()).max().unwrap_or(0);
+    for Finding { name, found, missing } in &findings {
+        say(format!("{name:width$}  {found}"));
+        if !missing.is_empty() {
+            say(format!("{:width$}  {missing}", ""));
+        }
+    }
+    Ok(())
+}
+
+fn finding(name: &'static str, found: String) -> Finding {
+    Finding { name, found, missing: String::new() }
+}
+
+fn processor() -> String {
+    let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
+    let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+    format!("{}{cores} cores", model.map(|(_, name)| format!("{name}, ")).unwrap_or_default())
+}
+
+/// The instruction sets that this program supports here; the fastest one runs everything.
+fn instruction_sets() -> Finding {
+    let best = Isa::best();
+    let known: Vec<&str> = Isa::ALL.into_iter().filter(|isa| isa.supported()).map(Isa::name).collect();
+    let found = format!("{} ({} agents at a time); available: {}", best.name(), best.lanes(), known.join(", "));
+    Finding { name: "instruction set", found, missing: best.obstacle().unwrap_or_default().into() }
+}
+
+/// Physics steps per second of one core.
+fn speed() -> Result<String, CliError> {
+    let model = marathon_envs::agent("hopper")?.model()?;
+    let lanes = Isa::best().lanes();
+    let mut batch =
+        Batch::new(&model, &BatchOptions { agents: lanes, ..BatchOptions::default() }).expect("its model is simulated");
+    let ctrl = vec![0.0; model.nu * lanes];
+    batch.step(&ctrl, STEPS);
+    let (start, mut steps) = (Instant::now(), 0);
+    while start.elapsed() < MEASURE {
+        batch.step(&ctrl, STEPS);
+        steps += STEPS * lanes;
+    }
+    let rate = steps as f64 / start.elapsed().as_secs_f64();
+    Ok(format!("{:.1} million physics steps of the hopper per second on one core", rate / 1e6))
+}
+
+fn python_of_tests() -> Finding {
+    let path = python::find();
+    let package = "import marathon_rl; print('with marathon_rl', marathon_rl.__version__)";
+    let package = output(Command::new(&path).args(["-c", package])).unwrap_or("without marathon_rl".into());
+    match output(Command::new(&path).arg("--version")) {
+        Some(version) => finding("Python", format!("{version} ({}) {package}", path.display())),
+        None => Finding {
+            name: "Python",
+            found: "not found".into(),
+            missing: "only the Python package, the comparisons with MuJoCo and the tests need it: https://python.org"
+                .into(),
+        },
+    }
+}
+
+/// The first line that a program prints.
+fn output(command: &mut Command) -> Option<String> {
+    let output = command.output().ok().filter(|output| output.status.success())?;
+    Some(String::from_utf8_lossy(&output.stdout).lines().next()?.trim().into())
+}
+
+fn program(name: &'static str, words: &[&str], missing: &str) -> Finding {
+    match output(Command::new(name).args(words)) {
+        Some(line) => finding(name, line),
+        None => Finding { name, found: "not found".into(), missing: missing.into() },
+    }
+}
+
+fn game() -> Finding {
+    match play::program() {
+        Some(path) => finding("game", path.display().to_string()),
+        None => Finding {
+            name: "game",
+            found: "not found".into(),
+            missing: "`marathon play` needs it: cargo build --release -p marathon-game".into(),
+        },
+    }
+}
+
+/// The Vulkan loader, without which the game has no window on Linux.
+fn graphics() -> Finding {
+    if !cfg!(target_os = "linux") {
+        return finding("graphics", "part of the system".into());
+    }
+    let folders = ["/usr/lib", "/usr/lib64", "/usr/lib/x86_64-linux-gnu", "/usr/lib/aarch64-linux-gnu", "/lib"];
+    let found = folders.iter().map(|folder| Path::new(folder).join("libvulkan.so.1")).find(|path| path.exists());
+    match found {
+        Some(path) => finding("graphics", path.display().to_string()),
+        None => Finding {
+            name: "graphics",
+            found: "no Vulkan loader".into(),
+            missing: "windows of the game need it: apt install libvulkan1 mesa-vulkan-drivers".into(),
+        },
+    }
+}
