@@ -3,7 +3,8 @@
 //! resumes with the same bits.
 
 use crate::error::RunError;
-use crate::folder::{Inputs, policy_path};
+use crate::folder::policy_path;
+use crate::run_file::Inputs;
 use crate::task_config::TaskConfig;
 use crate::text::whole;
 use marathon_envs::ModelSource;

@@ -3,7 +3,7 @@
 use crate::configuration;
 use crate::demonstrations::with_demonstrations;
 use crate::error::RunError;
-use crate::folder::{RunFile, RunFolder, write_json};
+use crate::folder::{RunFolder, write_json};
 use crate::imitation;
 use crate::inputs;
 use crate::options::RunOptions;
@@ -12,6 +12,7 @@ use crate::processes::Processes;
 use crate::report::csv::History;
 use crate::report::summary::{EPISODES, Summary};
 use crate::report::{Reporter, Watch, curve, save, save_policies};
+use crate::run_file::RunFile;
 use crate::task::Task;
 use crate::task_config::{TaskConfig, TaskOptions};
 use crate::text::{thousands, whole};

@@ -4,7 +4,7 @@ use marathon_envs::agents::marathon::marathon_man::clips::shipped;
 use marathon_envs::{Clips, NamedClip, Value};
 use marathon_learn::{Activation, Control, Policy, PolicyMeta};
 use marathon_runs::distill::{DistillOptions, distill};
-use marathon_runs::folder::{RunFile, RunFolder};
+use marathon_runs::{RunFile, RunFolder};
 use marathon_runs::{TaskConfig, TaskOptions};
 use std::path::{Path, PathBuf};
 

@@ -5,7 +5,8 @@ use super::canvas::{
 };
 use super::csv::History;
 use crate::error::RunError;
-use crate::folder::{RunFile, RunFolder};
+use crate::folder::RunFolder;
+use crate::run_file::RunFile;
 use crate::text::{duration, short, thousands};
 use plotters::coord::Shift;
 use plotters::prelude::*;

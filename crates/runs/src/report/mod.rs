@@ -9,7 +9,8 @@ pub mod summary;
 pub mod tensorboard;
 
 use crate::error::RunError;
-use crate::folder::{POLICIES, RunFile, RunFolder};
+use crate::folder::{POLICIES, RunFolder};
+use crate::run_file::RunFile;
 use csv::CsvLog;
 use marathon_learn::{Checkpoint, Control, IterationStats, Observer, Policy, Snapshot, TrainOutput};
 use progress::Progress;
