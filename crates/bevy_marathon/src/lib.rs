@@ -43,6 +43,7 @@
 //! |---|---|---|
 //! | `render` | yes | the module `look`: plugins that draw ragdolls |
 //! | `window` | yes | Bevy's window, input devices and glTF reader |
+//! | `baseline` | no | kernels for x86-64 processors without fused multiply-add |
 //!
 //! Without features nothing draws and no renderer is compiled, as a server needs it.
 
