@@ -5,7 +5,8 @@
 # feature `baseline`, the kernels for x86-64 processors without fused multiply-add.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-root="$PWD" dist="$PWD/release/dist"
+root=$(pwd -W 2> /dev/null || pwd) # as C:/... on Windows
+dist="$root/release/dist"
 case "$(uname -s)" in
   Linux) parts=(sdist wheel-x86_64 wheel-aarch64 wheel-musl-x86_64 cli-x86_64 cli-aarch64 game-x86_64) ;;
   Darwin) parts=(wheel-macos-arm64 wheel-macos-x86_64 cli-macos-arm64 cli-macos-x86_64 game-macos-arm64 game-macos-x86_64) ;;
@@ -113,13 +114,16 @@ if [ "$(uname -s)" = Linux ] || [ "$(uname -s)" = Darwin ]; then
   forbid=(--forbid "$root/" --forbid "$home/")
 fi
 
+notice=python/marathon_rl/THIRD-PARTY-LICENSES.txt
+trap 'rm -f "$notice"' EXIT
+
 made=()
 licenses() {
   "$python" release/licenses.py "$1" "$2" baseline > "$3"
 }
 
 wheel() {
-  local part="$1" platform work="$CARGO_TARGET_DIR/wheel-$1" text=python/marathon_rl/THIRD-PARTY-LICENSES.txt options=()
+  local part="$1" platform work="$CARGO_TARGET_DIR/wheel-$1" options=()
   platform=$(target "$part")
   case "$part" in
     wheel-x86_64 | wheel-aarch64) options=(--zig --compatibility manylinux_2_17) ;;
@@ -127,9 +131,9 @@ wheel() {
   esac
   rm -rf "$work"
   mkdir -p "$work"
-  licenses marathon-python "$platform" "$text"
+  licenses marathon-python "$platform" "$notice"
   maturin build --release --locked --features baseline --target "$platform" --out "$work" ${options[@]+"${options[@]}"}
-  rm -f "$text"
+  rm -f "$notice"
   twine check --strict "$work"/*.whl
   "$python" release/check.py ${forbid[@]+"${forbid[@]}"} "$work"/*.whl
   made=("$work"/*.whl)

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Checks products of a release: check.py [--static] [--forbid PATH ...] FILE ...
 
-Every file must have the licenses, and no file may contain one of the forbidden paths, such as the folder of the build. Wheels must
-be for the stable interface of Python 3.11. With --static, programs must be for Linux and need no libraries.
+Every file must have the licenses, and no file may contain one of the forbidden paths, such as the folder of the build.
+Wheels must be for the stable interface of Python 3.11. With --static, programs must be for Linux and need no libraries.
 """
 
 import argparse
@@ -34,6 +34,7 @@ def segments(data):
 
 
 def problems(path, forbidden, static):
+    """Sentences about all that is wrong with a product."""
     names = []
     for name, data in members(path):
         names.append(Path(name).name)
@@ -56,6 +57,7 @@ def problems(path, forbidden, static):
 
 
 def main():
+    """Checks the files of the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--static", action="store_true")
     parser.add_argument("--forbid", action="append", default=[])

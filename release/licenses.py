@@ -13,6 +13,7 @@ CODE = {".rs", ".py", ".toml", ".json"}
 
 
 def cargo(*words):
+    """Output of Cargo."""
     return subprocess.run(["cargo", *words], capture_output=True, check=True, text=True).stdout
 
 
@@ -25,6 +26,7 @@ def texts(folder):
 
 
 def main(package, target, *features):
+    """Prints each text once, below the names of its crates."""
     chosen = ["--locked", "--package", package, "--target", target, "--features", ",".join(features)]
     # one line per crate: `name v1.2.3 (more)`
     lines = cargo("tree", *chosen, "--edges", "normal", "--prefix", "none", "--format", "{p}").splitlines()

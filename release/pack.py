@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Packs files into an archive, the same bytes for the same files: pack.py ARCHIVE SOURCE=NAME ...
 
-ARCHIVE ends in .tar.gz or .zip, and its name without this ending is the folder inside. NAME is a path in that folder. All
-entries have the time of SOURCE_DATE_EPOCH.
+ARCHIVE ends in .tar.gz or .zip, and its name without this ending is the folder inside. NAME is a path in that folder.
+All entries have the time of SOURCE_DATE_EPOCH.
 """
 
 import gzip
@@ -16,10 +16,12 @@ from pathlib import Path
 
 
 def mode(source):
+    """Permissions of an entry."""
     return 0o755 if os.access(source, os.X_OK) and source.suffix in {"", ".exe", ".sh"} else 0o644
 
 
 def tar(out, entries, when):
+    """Writes a .tar.gz."""
     with gzip.GzipFile("", "wb", mtime=when, fileobj=out) as packed, tarfile.open(fileobj=packed, mode="w") as archive:
         for name, source in entries:
             data = source.read_bytes()
@@ -29,6 +31,7 @@ def tar(out, entries, when):
 
 
 def pack_zip(out, entries, when):
+    """Writes a .zip."""
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, source in entries:
             info = zipfile.ZipInfo(name, time.gmtime(when)[:6])
@@ -37,6 +40,7 @@ def pack_zip(out, entries, when):
 
 
 def main(target, *pairs):
+    """Writes the archive under a temporary name, and renames it."""
     target, when = Path(target), int(os.environ["SOURCE_DATE_EPOCH"])
     zipped = target.suffix == ".zip"
     folder = target.name.removesuffix(".zip" if zipped else ".tar.gz")
