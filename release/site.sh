@@ -1,0 +1,18 @@
+#!/usr/bin/env bash
+# Builds the site of the documentation in target/site: the book, and below api the pages of all crates but those for Bevy.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+site=target/site
+[ -x docs/serve.sh ] || { echo 'release/site.sh: there is no docs/serve.sh, which builds the book' >&2 && exit 1; }
+docs/serve.sh --build
+crates=(marathon-physics marathon-motion marathon-envs marathon-learn marathon-render marathon-config marathon-mlagents
+  marathon-runs marathon-rl)
+# pages of crates that are gone would stay
+rm -rf "$site" target/api
+RUSTDOCFLAGS='-D warnings' cargo doc --locked --no-deps --lib --target-dir target/api "${crates[@]/#/--package=}"
+mkdir -p "$site"
+cp -R target/book/. "$site/"
+cp -R target/api/doc "$site/api"
+rm -f "$site/api/.lock"
+echo '<!DOCTYPE html><meta http-equiv="refresh" content="0; url=marathon_rl/index.html"><title>Marathon</title>' > "$site/api/index.html"
+echo "$site" >&2
