@@ -9,11 +9,14 @@ python=$(command -v python3 || command -v python)
 
 baseline=(bench physics --agent hopper --isa baseline --seconds 0.05 --agents 4 --warmup 0)
 
-echo 'wheel' >&2
+wheel=("$folder"/marathon_rl-*.whl)
+version=$(basename "${wheel[0]}" | cut -d - -f 2)
+echo "marathon-rl $version" >&2
 "$python" -m venv "$scratch/env"
 bin="$scratch/env/bin"
 [ -d "$bin" ] || bin="$scratch/env/Scripts"
-"$bin/python" -m pip install --quiet --disable-pip-version-check --only-binary marathon-rl --find-links "$folder" --pre marathon-rl
+"$bin/python" -m pip install --quiet --disable-pip-version-check --only-binary marathon-rl --find-links "$folder" \
+  "marathon-rl==$version"
 (
   cd "$scratch"
   "$bin/python" -c 'import marathon_rl; marathon_rl.VecEnv("hopper", 2).reset()'
