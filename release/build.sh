@@ -123,7 +123,7 @@ licenses() {
 }
 
 wheel() {
-  local part="$1" platform work="$CARGO_TARGET_DIR/wheel-$1" options=()
+  local part="$1" platform work="$CARGO_TARGET_DIR/$1" options=()
   platform=$(target "$part")
   case "$part" in
     wheel-x86_64 | wheel-aarch64) options=(--zig --compatibility manylinux_2_17) ;;
@@ -193,7 +193,12 @@ game() {
 }
 
 checksums() {
-  local sum=(sha256sum)
+  local sum=(sha256sum) stamp
+  for stamp in "$dist"/.built/*; do
+    if [ -e "$stamp" ] && [ "$(head -n 1 "$stamp")" != "$commit" ]; then
+      echo "release/build.sh: release/dist has $(basename "$stamp") of another commit" >&2
+    fi
+  done
   command -v sha256sum > /dev/null || sum=(shasum -a 256)
   (
     cd "$dist"
