@@ -22,6 +22,8 @@ def section(nodes: list[Definition], level: str, imports: Mapping[str, str]) -> 
 
 def _function(title: str, signatures: list[str], nodes: list[ast.FunctionDef], level: str) -> list[str]:
     text = next((text for node in nodes if (text := docstring(node))), "")
+    # two underscores would be bold
+    title = code(title) if "__" in title else title
     return [f"{level} {title}", "", *block("py", "\n".join(signatures)), *markdown(text)]
 
 

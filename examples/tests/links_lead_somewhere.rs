@@ -1,7 +1,7 @@
 //! Relative links in the documentation lead somewhere: to a file, and to a heading where one is named. Every page is in
 //! the book's summary, and every example that a command names exists.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 fn root() -> PathBuf {
@@ -27,30 +27,42 @@ fn pages() -> Vec<PathBuf> {
     found
 }
 
-/// Text outside of code blocks.
+/// Text outside of code blocks. A block ends where a line has as many ticks as the first one, and nothing else.
 fn prose(text: &str) -> String {
-    let mut code = false;
+    let mut ticks = 0;
     let lines = text.lines().filter(|line| {
-        let fence = line.trim_start().starts_with("```");
-        code ^= fence;
-        !code && !fence
+        let line = line.trim();
+        let found = line.len() - line.trim_start_matches('`').len();
+        let inside = ticks > 0;
+        if inside && found >= ticks && found == line.len() {
+            ticks = 0;
+        } else if !inside && found >= 3 {
+            ticks = found;
+        }
+        !inside && ticks == 0
     });
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// Targets of `[text](target)` and `![text](target)`.
+/// Targets of `[text](target)`, `![text](target)`, and of `src`, `href` and `poster` in HTML.
 fn links(text: &str) -> Vec<String> {
-    let after = text.split("](").skip(1);
-    after.filter_map(|rest| rest.split([')', ' ']).next()).map(str::to_owned).collect()
+    let markdown = text.split("](").skip(1).filter_map(|rest| rest.split([')', ' ']).next());
+    let html = [" src=\"", " href=\"", " poster=\""].map(|start| text.split(start).skip(1));
+    let html = html.into_iter().flatten().filter_map(|rest| rest.split('"').next());
+    markdown.chain(html).map(str::to_owned).collect()
 }
 
-/// Anchors of the headings, as GitHub and mdBook make them.
+/// Anchors of the headings, as GitHub and mdBook make them. Headings of the same text have numbers.
 fn anchors(text: &str) -> BTreeSet<String> {
     let text = prose(text);
     let headings = text.lines().filter(|line| line.starts_with('#')).map(|line| line.trim_start_matches('#').trim());
+    let mut count = BTreeMap::new();
     let slug = |heading: &str| {
         let kept = heading.to_lowercase().replace(' ', "-");
-        kept.chars().filter(|c| c.is_alphanumeric() || "-_".contains(*c)).collect()
+        let slug: String = kept.chars().filter(|c| c.is_alphanumeric() || "-_".contains(*c)).collect();
+        let number = count.entry(slug.clone()).or_insert(0);
+        *number += 1;
+        if *number == 1 { slug } else { format!("{slug}-{}", *number - 1) }
     };
     headings.map(slug).collect()
 }
@@ -88,10 +100,14 @@ fn relative_links_lead_somewhere() {
 fn every_page_is_in_the_summary() {
     let docs = root().join("docs");
     let summary = std::fs::read_to_string(docs.join("SUMMARY.md")).expect("the summary");
-    let listed: BTreeSet<PathBuf> = links(&summary).iter().map(|link| docs.join(link)).collect();
-    for page in pages().iter().filter(|page| page.starts_with(&docs) && !page.ends_with("SUMMARY.md")) {
-        assert!(listed.contains(page), "{} is not in docs/SUMMARY.md", page.display());
+    let mut listed = BTreeSet::new();
+    for link in links(&summary) {
+        assert!(listed.insert(docs.join(&link)), "docs/SUMMARY.md has '{link}' twice");
     }
+    let missing: Vec<PathBuf> = pages().into_iter().filter(|page| page.starts_with(&docs)).collect();
+    let missing = missing.iter().filter(|page| !page.ends_with("SUMMARY.md") && !listed.contains(*page));
+    let missing: Vec<String> = missing.map(|page| page.display().to_string()).collect();
+    assert!(missing.is_empty(), "not in docs/SUMMARY.md:\n{}", missing.join("\n"));
 }
 
 #[test]

@@ -53,7 +53,7 @@ def end_group(process: "subprocess.Popen[bytes]") -> None:
 
 
 def command(words: list[str], folder: Path, environment: dict[str, str], limit: float) -> str | None:
-    """Run a command to its end; return the error. What it leaves running is killed."""
+    """Run a command to its end; return the error. Processes that it leaves running are killed."""
     with open(folder.parent / "output.txt", "w+b") as output:
         process = subprocess.Popen(
             words,

@@ -86,7 +86,15 @@ pub mod prelude {
     pub use marathon_runs::TaskConfig;
 }
 
-/// The programs of the README are compiled as tests.
+/// The programs of the README and of the documentation are compiled as tests.
 #[cfg(all(doctest, feature = "window"))]
-#[doc = include_str!("../README.md")]
-struct Readme;
+mod pages {
+    #[doc = include_str!("../README.md")]
+    struct Readme;
+
+    #[doc = include_str!("../../../docs/tutorials/bevy.md")]
+    struct Tutorial;
+
+    #[doc = include_str!("../../../docs/reference/bevy.md")]
+    struct Reference;
+}
