@@ -195,7 +195,7 @@ class VecEnv:
             threads: number of threads, at most 1024; 0 means one per processor core. There are never more than blocks
                 of 16 agents.
             isa: instruction set; None means the widest that the processor has.
-            autoreset: what happens to an agent whose episode ended. "same_step": `obs` is the first observation of the
+            autoreset: handling of agents whose episode ended. "same_step": `obs` is the first observation of the
                 next episode already, `final_obs` the last one of the old. "next_step": the next step ignores its action
                 and returns the first observation with reward 0. "disabled": nothing; use `reset(mask=...)`.
             max_episode_steps: steps after which an episode is truncated; None means the task's own number.
@@ -214,7 +214,7 @@ class VecEnv:
         """Number of threads."""
     @property
     def autoreset(self) -> Literal["next_step", "same_step", "disabled"]:
-        """What happens to an agent whose episode ended."""
+        """Handling of agents whose episode ended."""
     @property
     def copy(self) -> bool:
         """Whether every step returns new arrays."""
@@ -235,9 +235,9 @@ class VecEnv:
         """Terms of the last step's rewards, ``(num_envs, len(spec.reward_terms))``; they add up to the rewards."""
     @property
     def info(self) -> npt.NDArray[np.float32]:
-        """What the agents report about the states that the last step reached, ``(num_envs, len(spec.info))``."""
+        """Reports of the agents about the states that the last step reached, ``(num_envs, len(spec.info))``."""
     def read_info(self) -> npt.NDArray[np.float32]:
-        """What the agents report about their present states, ``(num_envs, len(spec.info))``, a new array.
+        """Reports of the agents about their present states, ``(num_envs, len(spec.info))``, a new array.
 
         It differs from `info` where a step has begun an episode.
         """
@@ -296,7 +296,7 @@ class VecEnv:
     ) -> None:
         """Give agents, all or those of a mask, constants of their own, for domain randomization.
 
-        They last over resets, until changed, and belong to snapshots. What is not given is the model's own.
+        They last over resets, until changed, and belong to snapshots. Constants that are not given are the model's own.
 
         Args:
             mass: factors of the bodies' masses and inertias, ``(num_envs, nbody)``.
@@ -399,7 +399,7 @@ class Policy:
 
 @final
 class TrainResult:
-    """What a run has led to."""
+    """Result of a training run."""
 
     @property
     def policy(self) -> Policy:

@@ -75,11 +75,11 @@ class MarathonAgent:
     termination_reward: ClassVar[float | None] = -1.0
     """Reward of a decision in which an agent failed, in place of all other terms; None: the terms count on."""
     controls: ClassVar[Literal["nominal", "raw"]] = "nominal"
-    """What an action is. "nominal": a number in [-1, 1] per actuator, clipped. "raw": the actuator's control in its own
-    units, within its `ctrlrange` but not clipped: the agent sees and pays for what was asked for, while the physics
+    """Meaning of an action. "nominal": a number in [-1, 1] per actuator, clipped. "raw": the actuator's control in its
+    own units, within its `ctrlrange` but not clipped: the agent sees and pays for what was asked for, while the physics
     clamps what acts."""
     commands: ClassVar[Sequence[CommandRange]] = ()
-    """What the agents can be told to do, a number each; see `draw_command`."""
+    """Commands that the agents take, a number each; see `draw_command`."""
     metrics: ClassVar[Sequence[str]] = ("forward",)
     """Numbers that tell, decision by decision, how well the task is done: names out of `info`, and "forward"."""
     memory_size: ClassVar[int] = 0
@@ -95,7 +95,7 @@ class MarathonAgent:
         self.memory: FloatArray = np.zeros((num_agents, self.memory_size))
         """The agents' own variables, `(N, memory_size)`; at the start of an episode zero, or from `agent_reset`."""
         self.command: FloatArray = np.zeros((num_agents, len(self.commands)))
-        """What the agents are told, `(N, len(commands))`.
+        """Commands of the agents, `(N, len(commands))`.
 
         In `observations` it is what to do from now on, elsewhere what the decision was made under.
         """

@@ -61,7 +61,7 @@ class Workers:
             answer_timeout: longest time that an actor may take for a rollout, s; None means any time. One that takes
                 longer is replaced. If its replacement does too, the run ends with a `TimeoutError`. The time in which
                 an actor waits for free processors counts.
-            **options: what `ray.remote` takes for an actor, such as `num_cpus` (default: 1) or `resources`.
+            **options: arguments of `ray.remote` for an actor, such as `num_cpus` (default: 1) or `resources`.
         """
         if count < 1:
             raise ValueError(f"count is {count}, expected at least 1")

@@ -64,7 +64,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         Args:
             task: name of the task, as in `marathon_rl.ids()`, or a `MarathonAgent` class.
             num_envs: number of agents.
-            autoreset_mode: what happens to an agent whose episode ended.
+            autoreset_mode: handling of agents whose episode ended.
             render_mode: None, or "rgb_array" for pictures of `width` x `height` pixels, one for each agent.
             max_episode_steps: steps after which an episode is truncated; None means the task's own number, -1 never.
             threads: number of threads, as in `VecEnv`.
