@@ -35,7 +35,9 @@ class Tools:
             path.write_text(f'#!/bin/sh\nexec "{target}" "$@"\n')
             path.chmod(0o755)
         paths = [str(folder), str(self.python.parent), os.environ.get("PATH", "")]
-        return {**os.environ, "PATH": os.pathsep.join(paths), "MPLBACKEND": "Agg", "PYTHONDONTWRITEBYTECODE": "1"}
+        # no windows, and no installations by blocks whose comment is forgotten
+        quiet = {"MPLBACKEND": "Agg", "PYTHONDONTWRITEBYTECODE": "1", "PIP_NO_INDEX": "1", "CARGO_NET_OFFLINE": "true"}
+        return {**os.environ, **quiet, "PATH": os.pathsep.join(paths)}
 
 
 def last_lines(text: str) -> str:

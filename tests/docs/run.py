@@ -30,6 +30,8 @@ from notebooks import cells
 
 ROOT = Path(__file__).resolve().parents[2]
 LIMIT, LONG_LIMIT = 60.0, 600.0
+SLOW = 20.0
+"""Seconds after which a block is to have the mark of long ones."""
 NOTEBOOK = ".ipynb"
 
 
@@ -39,6 +41,8 @@ class Report:
 
     failures: list[str] = field(default_factory=list)
     skipped: list[str] = field(default_factory=list)
+    slow: list[str] = field(default_factory=list)
+    """Blocks without a mark that took long."""
     ran: int = 0
 
 
@@ -122,7 +126,11 @@ def run_page(path: Path, tools: Tools, long: bool, report: Report) -> None:
                 left_out = left_out or block.line
             else:
                 report.ran += 1
+                begun = time.monotonic()
                 problem = page.run(block)
+                seconds = time.monotonic() - begun
+                if seconds > SLOW and not block.long:
+                    report.slow.append(f"{place}: {seconds:.0f} s")
                 if problem and left_out:
                     report.skipped.append(f"{place}: it needs the long block of line {left_out}")
                 elif problem:
@@ -131,7 +139,8 @@ def run_page(path: Path, tools: Tools, long: bool, report: Report) -> None:
         page.close()
     failed = len(report.failures) > before
     if chosen or failed:
-        seconds, state = time.monotonic() - start, "FAILED" if failed else "ok"
+        seconds = time.monotonic() - start
+        state = "FAILED" if failed else "ok"
         print(f"{name}: {len(chosen)} blocks, {seconds:.1f} s: {state}", flush=True)
 
 
@@ -159,10 +168,9 @@ def main() -> None:
         run_page(page, tools, options.long, report)
     for failure in report.failures:
         print(f"\n{failure}")
-    if report.skipped:
-        print(f"\nskipped: {len(report.skipped)} blocks")
-        for entry in report.skipped:
-            print(f"  {entry}")
+    for title, entries in (("slow, to be marked as long", report.slow), ("skipped", report.skipped)):
+        if entries:
+            print("\n  ".join([f"\n{title}:", *entries]))
     print(f"\n{report.ran} blocks ran, {len(report.failures)} failed, {len(report.skipped)} were skipped")
     sys.exit(1 if report.failures else 0)
 
