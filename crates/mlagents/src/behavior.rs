@@ -1,3 +1,4 @@
+// one file: the behavior of a role is one protocol object, and its parts share their fields
 //! Agents of one kind under one of ML-Agents' behavior names, or one name per role of their task: from actions to
 //! infos.
 

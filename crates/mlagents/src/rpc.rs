@@ -1,3 +1,4 @@
+// one file: one protocol (HTTP/2 with one call at a time), whose frames, headers and flow control belong together
 //! gRPC's unary call over one blocking HTTP/2 connection, limited to the needs of one method.
 //!
 //! A player makes one call at a time to one server that has just started on the same machine. Frames follow [RFC

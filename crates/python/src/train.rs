@@ -105,6 +105,7 @@ pub fn train(
     options: Option<&Bound<'_, PyDict>>,
     initialize_from: Option<PathBuf>,
 ) -> PyResult<TrainResult> {
+    // one function: the keywords of Python in order
     let of_task = match &task {
         Some(Task::Name(name)) => arguments::read(task::plain(name), options)?,
         _ => arguments::read("", options)?,

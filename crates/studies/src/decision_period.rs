@@ -23,6 +23,7 @@ const SECONDS: f64 = 2.0;
 /// # Errors
 /// If that fails.
 pub fn run(options: &Options) -> Result<Record, StudyError> {
+    // one function: the text of the page in order
     let (isa, mut rows, mut lines) = (Isa::best(), Vec::new(), Vec::new());
     for agent in AGENTS {
         let own = registry::factory(agent, isa)?.spec().frame_skip;

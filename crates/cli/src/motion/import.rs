@@ -135,6 +135,7 @@ fn write(
     mut notes: Vec<String>,
     json: bool,
 ) -> Result<(), CliError> {
+    // one function: a list of edits in the order in which they apply
     let mut recording = animation.clip().clone();
     if let Some(&[from, to]) = edits.trim.as_deref() {
         recording = recording.trim(path, from, to)?;

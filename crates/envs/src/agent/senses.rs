@@ -1,3 +1,4 @@
+// one file: the list of readings that agents can take
 //! An agent's perception, and the paper's library of bonuses and penalties.
 //!
 //! The names are those of the original's `MarathonAgent` (`GetForwardBonus`, `GetEffort`, ...) in Rust's casing. As in

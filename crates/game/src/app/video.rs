@@ -110,23 +110,7 @@ pub fn record(film: &Film<'_>, game: impl Plugin) -> Result<(), GameError> {
     let mut sink = Sink::new(out, fps)?;
     check_graphics()?;
     let frame = Duration::from_secs_f64(1.0 / fps);
-    let mut app = App::new();
-    let headless = WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
-    let render = RenderPlugin { synchronous_pipeline_compilation: true, ..default() };
-    let log = bevy::log::LogPlugin { level: bevy::log::Level::WARN, ..default() };
-    app.add_plugins(
-        DefaultPlugins
-            .set(headless)
-            .set(render)
-            .set(log)
-            .disable::<WinitPlugin>()
-            .disable::<TerminalCtrlCHandlerPlugin>()
-            .disable::<PipelinedRenderingPlugin>(),
-    )
-    .add_plugins(game)
-    .init_resource::<Reel>()
-    .insert_resource(Filmed)
-    .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
+    let mut app = windowless(game);
     // film time equals simulated time at any frame rate
     let longest = app.world().resource::<Time<Virtual>>().max_delta().max(frame);
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(longest);
@@ -136,17 +120,7 @@ pub fn record(film: &Film<'_>, game: impl Plugin) -> Result<(), GameError> {
     app.finish();
     app.cleanup();
 
-    let size = Extent3d { width, height, depth_or_array_layers: 1 };
-    let mut target = Image::new_fill(
-        size,
-        TextureDimension::D2,
-        &[0; 4],
-        TextureFormat::Rgba8UnormSrgb,
-        RenderAssetUsages::default(),
-    );
-    target.texture_descriptor.usage =
-        TextureUsages::COPY_SRC | TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING;
-    let target = app.world_mut().resource_mut::<Assets<Image>>().add(target);
+    let target = target(&mut app, width, height);
     // cameras are made at startup
     app.update();
     let mut cameras = app.world_mut().query_filtered::<Entity, With<FollowCamera>>();
@@ -155,10 +129,6 @@ pub fn record(film: &Film<'_>, game: impl Plugin) -> Result<(), GameError> {
         app.world_mut().entity_mut(*camera).insert(RenderTarget::Image(target.clone().into()));
     }
 
-    let pace = |app: &mut App, step: Duration| {
-        app.insert_resource(TimeUpdateStrategy::ManualDuration(step));
-        app.update();
-    };
     let draw = |app: &mut App, on: bool| {
         for camera in &cameras {
             if let Some(mut camera) = app.world_mut().get_mut::<Camera>(*camera) {
@@ -170,20 +140,7 @@ pub fn record(film: &Film<'_>, game: impl Plugin) -> Result<(), GameError> {
     draw(&mut app, false);
     let before = (start / frame.as_secs_f64()).round() as usize;
     pace(&mut app, Duration::from_secs_f64(1.0 / TICKS));
-    // a thread reads the skin
-    let begun = Instant::now();
-    while let Some(skin) = app.world().get_resource::<WornSkin>() {
-        match &skin.state {
-            SkinState::Worn => break,
-            SkinState::Refused(problem) => return Err(GameError::System(problem.clone())),
-            SkinState::Waiting if begun.elapsed() > LONGEST_FITTING => {
-                return Err(GameError::System(format!("{}: it takes too long to read", skin.path.display())));
-            }
-            SkinState::Waiting => {}
-        }
-        pace(&mut app, Duration::ZERO);
-        std::thread::sleep(Duration::from_millis(2));
-    }
+    wait_for_skin(&mut app)?;
     let mut over = false;
     for _ in 0..before {
         pace(&mut app, frame);
@@ -239,6 +196,67 @@ pub fn record(film: &Film<'_>, game: impl Plugin) -> Result<(), GameError> {
     // the reader of a pipe may have closed it
     let _ = writeln!(std::io::stdout(), "wrote {}", out.display());
     Ok(())
+}
+
+/// The app without a window, whose time stands still.
+fn windowless(game: impl Plugin) -> App {
+    let mut app = App::new();
+    let headless = WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
+    let render = RenderPlugin { synchronous_pipeline_compilation: true, ..default() };
+    let log = bevy::log::LogPlugin { level: bevy::log::Level::WARN, ..default() };
+    app.add_plugins(
+        DefaultPlugins
+            .set(headless)
+            .set(render)
+            .set(log)
+            .disable::<WinitPlugin>()
+            .disable::<TerminalCtrlCHandlerPlugin>()
+            .disable::<PipelinedRenderingPlugin>(),
+    )
+    .add_plugins(game)
+    .init_resource::<Reel>()
+    .insert_resource(Filmed)
+    .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
+    app
+}
+
+/// A picture that cameras draw into.
+fn target(app: &mut App, width: u32, height: u32) -> Handle<Image> {
+    let size = Extent3d { width, height, depth_or_array_layers: 1 };
+    let mut target = Image::new_fill(
+        size,
+        TextureDimension::D2,
+        &[0; 4],
+        TextureFormat::Rgba8UnormSrgb,
+        RenderAssetUsages::default(),
+    );
+    target.texture_descriptor.usage =
+        TextureUsages::COPY_SRC | TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING;
+    app.world_mut().resource_mut::<Assets<Image>>().add(target)
+}
+
+/// Waits until the skin is worn. A thread reads it.
+fn wait_for_skin(app: &mut App) -> Result<(), GameError> {
+    let begun = Instant::now();
+    while let Some(skin) = app.world().get_resource::<WornSkin>() {
+        match &skin.state {
+            SkinState::Worn => break,
+            SkinState::Refused(problem) => return Err(GameError::System(problem.clone())),
+            SkinState::Waiting if begun.elapsed() > LONGEST_FITTING => {
+                return Err(GameError::System(format!("{}: it takes too long to read", skin.path.display())));
+            }
+            SkinState::Waiting => {}
+        }
+        pace(app, Duration::ZERO);
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    Ok(())
+}
+
+/// Updates the app after a step of time.
+fn pace(app: &mut App, step: Duration) {
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(step));
+    app.update();
 }
 
 /// Removes the padding of rows to 256 bytes, and alpha.

@@ -93,6 +93,7 @@ impl<T: Real> Kernel<T> for Loss<'_, T> {
 
     #[inline(always)]
     fn run(self) -> LossSums {
+        // one function: a loss and its gradient in order
         let Loss {
             objective, gaussian, samples, mean: (mean, d_mean), value: (value, d_value), d_log_std, rows, ..
         } = self;

@@ -1,3 +1,4 @@
+// one file: forward and backward pass mirror each other
 //! Multi-layer perceptrons in the lane layout of the physics.
 //!
 //! Parameters are one flat array: for each layer the weights `[output][input]`, then the biases (PyTorch's order).

@@ -1,3 +1,4 @@
+// one file: the loss and its second derivatives mirror each other
 //! Imitation by a discriminator: a network learns to distinguish the agent's decisions from demonstrated ones. The
 //! reward is high where it fails.
 //!

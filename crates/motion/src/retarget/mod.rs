@@ -51,6 +51,7 @@ const FASTEST: f64 = 25.0;
 /// # Errors
 /// If the model cannot hold the result, for example because it has no joints.
 pub fn retarget(path: &Path, animation: &Animation, model: &Model, mapping: &Mapping) -> Result<Clip, MotionError> {
+    // one function: the stages of retargeting in order
     if model.joints.is_empty() {
         return Err(MotionError::model(path, &model.name, "it has no joints"));
     }

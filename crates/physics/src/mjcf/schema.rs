@@ -1,3 +1,4 @@
+// one file: the table of all MJCF elements and attributes
 //! Which elements and attributes MJCF has (MuJoCo 4.0), and which of them this engine takes.
 //!
 //! Everything in a file is either read, or known to leave the dynamics alone, or refused with its file and line.

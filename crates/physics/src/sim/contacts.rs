@@ -77,6 +77,7 @@ pub(super) fn contacts<T: Real>(
     tree_of: &[usize],
     options: &SimOptions,
 ) -> Result<Contacts<T::Scalar>, SimError> {
+    // one function: the pairs of shapes in order
     let mut out = Contacts::none();
     if !(model.opt.flags.contact && model.opt.flags.constraint) {
         return Ok(out);

@@ -9,6 +9,7 @@ use std::path::Path;
 impl CommandTracking {
     /// The results as tables.
     pub fn table(&self) -> String {
+        // one function: the rows of a table in order
         let CommandTracking { agents, minutes, stand, .. } = self;
         let Minutes { without_fall, early_falls, falls_per_minute, velocity_error, settled_error, slide } = minutes;
         let Stand { still, falls, drift, speed } = stand;

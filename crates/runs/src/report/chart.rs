@@ -47,6 +47,7 @@ impl Chart {
     }
 
     fn picture(&self) -> Result<Vec<u8>, DrawError> {
+        // one function: the parts of a picture in order
         register_fonts();
         let [width, height] = SIZE.map(|side| side * SCALE);
         let mut rgb = vec![0; 3 * (width * height) as usize];

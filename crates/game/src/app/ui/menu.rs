@@ -216,6 +216,7 @@ fn window(
 }
 
 fn choose(ui: &mut Ui, draft: &mut Draft, shipped: &ShippedPolicies) {
+    // one function: a table of menu items
     ui.horizontal(|ui| {
         for mode in Mode::IN_MENU {
             let label = RichText::new(mode.name()).size(15.0);

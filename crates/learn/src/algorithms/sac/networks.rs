@@ -125,6 +125,7 @@ pub(super) fn gradient(
     space: &mut Space,
     gradient: &mut [f32],
 ) -> LossSums {
+    // one function: a backward pass in order
     let (layout, isa, act, n) = (&nets.layout, nets.isa, nets.layout.act, noise.len());
     let params = &nets.params;
     let (actor, critics) = (&params[..layout.actor.len()], layout.critics(params));

@@ -76,6 +76,7 @@ fn task(meta: &PolicyMeta) -> Spec {
 
 /// Reads the policy of a file, for a given task or the one that the file names.
 pub fn decode(path: &Path, bytes: &[u8], spec: Option<&Spec>) -> Result<Policy, Error> {
+    // one function: a table of operators
     let wrong = |place: &str, found: String, expected: &str| Error::file(path, place, found, expected);
     let model = model(path, bytes)?;
     let noted = noted(&model);

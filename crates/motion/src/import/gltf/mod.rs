@@ -55,6 +55,7 @@ pub fn glb(path: &Path, bytes: &[u8]) -> Result<Animation, MotionError> {
 }
 
 pub(super) fn read(path: &Path, bytes: &[u8], reading: &Reading) -> Result<Recording, MotionError> {
+    // one function: the stages of reading in order
     let wrong = |key: &str, found: String, expected: &str| MotionError::value(path, key, found, expected);
     let (document, blob) = document::read(path, bytes)?;
     let (chosen, mut notes) = choose(path, &document, reading.animation.as_deref())?;

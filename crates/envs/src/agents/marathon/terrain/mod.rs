@@ -1,3 +1,4 @@
+// one file: the observation, reward and roles of one task
 //! Figures that run over uneven ground: the paper's assault courses.
 //!
 //! Each agent has its own ground, drawn for every episode: a [course] of some kind and difficulty.
