@@ -12,8 +12,9 @@ fi
 target="${CARGO_TARGET_DIR:-$PWD/target}"
 wheels="$target/wheels" clean="$target/clean-venv" site="$target/python-site"
 
-"$python" -m ruff check python examples/python
-"$python" -m ruff format --check python examples/python
+scripts=(python examples/python docs/*.py docs/generator tests/docs)
+"$python" -m ruff check "${scripts[@]}"
+"$python" -m ruff format --check "${scripts[@]}"
 
 # the native module that ./test.sh has built: `--workspace` and a test among the targets keep the features of dependencies
 . tests/packages.sh
@@ -24,8 +25,13 @@ cp -R python/marathon_rl "$site"
 cp "$target/release/libmarathon_python.so" "$site/marathon_rl/_native.abi3.so"
 export PYTHONPATH="$site"
 "$python" -m mypy python/marathon_rl
+(cd docs && "$python" -m mypy --config-file ../pyproject.toml generate.py preprocess.py check_links.py)
+(cd tests/docs && "$python" -m mypy --config-file ../../pyproject.toml ./*.py)
 (cd "$site" && "$python" -m mypy.stubtest marathon_rl._native)
 "$python" -m pytest --quiet "$@"
+# the code blocks of all pages, and the generated pages
+tests/docs/run.py --program "$target/release/marathon" --python "$python"
+docs/generate.py --program "$target/release/marathon" --check
 
 if [ -n "${MARATHON_TEST_WHEEL:-}" ]; then
   unset PYTHONPATH

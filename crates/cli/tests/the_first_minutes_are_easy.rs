@@ -1,5 +1,5 @@
-//! What a newcomer meets first: a video after training, a report about the computer, completions, help of the game
-//! without the game, few but fitting names, and a warning before a longer run changes its schedules.
+//! The first minutes of a newcomer: training ends with a video, `doctor` reports the computer, shells complete commands,
+//! the help of the game needs no game, a misspelled task gets few names, and a longer run says which schedules change.
 
 mod common;
 
