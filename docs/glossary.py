@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Compares the public words of Marathon with the table of docs/glossary.md.
+"""Compares the public words of Marathon with the table of docs/reference/glossary.md.
 
     docs/glossary.py --program target/release/marathon            print the rows that are missing
     docs/glossary.py --program target/release/marathon --check    fail if a row is missing or out of date
@@ -19,7 +19,7 @@ from itertools import pairwise
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-PAGE = ROOT / "docs/glossary.md"
+PAGE = ROOT / "docs/reference/glossary.md"
 LEFT_OUT = {"self", "cls", "args", "kwargs", "help", "version"}
 # a word, its kind (command line, task option, configuration or Python), and its command, task, section or class
 Found = tuple[str, str, str]
@@ -63,8 +63,8 @@ def keys(value: dict, section: str = "the file") -> Iterator[Found]:
 
 
 def configuration(program: str) -> Iterator[Found]:
-    """Keys of docs/configs.md (its examples and its reference, which a test holds complete) and of a task."""
-    page = (ROOT / "docs/configs.md").read_text().partition("## Files of ML-Agents")[0]
+    """Keys of docs/reference/configs.md (its examples and its reference, which a test holds complete) and of a task."""
+    page = (ROOT / "docs/reference/configs.md").read_text().partition("## Files of ML-Agents")[0]
     for key in re.findall(r"^(?:\* `)?(\w+):(?: |$)", page, re.MULTILINE):
         yield key, "configuration", "the file"
     sections: list[str] = []

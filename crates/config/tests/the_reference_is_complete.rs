@@ -1,4 +1,4 @@
-//! `docs/configs.md` lists every key that there is: each field of the trainer's configuration, and no other.
+//! `docs/reference/configs.md` lists every key that there is: each field of the trainer's configuration, and no other.
 
 use marathon_config::{default_of, keys, parse, reference};
 use marathon_learn::{Algorithm, Form, Imitation, Novelty, RewardConfig, RewardKind};
@@ -39,7 +39,7 @@ fn every_field_of_the_configuration_is_a_key_and_every_key_a_field() {
 
 #[test]
 fn the_page_has_the_reference() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/configs.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/configs.md");
     let page = std::fs::read_to_string(&path).unwrap();
     let (before, rest) = page.split_once(START).expect("the start of the reference");
     let (found, after) = rest.split_once(END).expect("the end of the reference");
@@ -47,13 +47,13 @@ fn the_page_has_the_reference() {
         std::fs::write(&path, format!("{before}{START}{}{END}{after}", reference())).unwrap();
         return;
     }
-    assert!(found == reference(), "docs/configs.md is out of date: run this test with MARATHON_BLESS=1");
+    assert!(found == reference(), "docs/reference/configs.md is out of date: run this test with MARATHON_BLESS=1");
 }
 
 /// Configurations in the text of the page, native or of ML-Agents, are right.
 #[test]
 fn the_examples_of_the_page_are_valid() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/configs.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reference/configs.md");
     let page = std::fs::read_to_string(&path).unwrap();
     let examples: Vec<&str> = page.split("```yaml\n").skip(1).filter_map(|rest| rest.split("```").next()).collect();
     assert!(examples.len() >= 4, "{examples:?}");

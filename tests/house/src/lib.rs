@@ -1,7 +1,7 @@
 //! The house as it stands: crates, the rooms in each, and every import from one file to another.
 //!
 //! A *room* is a top-level module of a crate: a folder or a file under `src`. [`House::read`] parses the sources and follows
-//! each path to the file that defines its name. [`Order::read`] takes from `docs/architecture.md` the order in which crates and
+//! each path to the file that defines its name. [`Order::read`] takes from `docs/project/architecture.md` the order in which crates and
 //! rooms are said to stand. The test compares them; `cargo run -p house` draws the picture of that page.
 
 mod imports;

@@ -1,4 +1,4 @@
-//! `cargo run -p house` writes `docs/images/house.svg`, the picture of `docs/architecture.md`. `cargo run -p house -- order`
+//! `cargo run -p house` writes `docs/images/house.svg`, the picture of `docs/project/architecture.md`. `cargo run -p house -- order`
 //! prints for each crate an order in which its rooms can stand, and the imports that stand in the way of one.
 //! `cargo run -p house -- circles` prints the groups of files that import each other, and their imports.
 
@@ -18,7 +18,7 @@ fn main() -> Result<(), house::Error> {
         }
         _ => {}
     }
-    let order = Order::read(&house.root.join("docs/architecture.md"))?;
+    let order = Order::read(&house.root.join("docs/project/architecture.md"))?;
     let path = house.root.join("docs/images/house.svg");
     std::fs::write(&path, picture::svg(&house, &order)).map_err(|source| house::Error::Io { path, source })
 }

@@ -1,4 +1,4 @@
-//! The order in which crates and rooms are said to stand, as `docs/architecture.md` has it.
+//! The order in which crates and rooms are said to stand, as `docs/project/architecture.md` has it.
 
 use crate::Error;
 use std::path::Path;

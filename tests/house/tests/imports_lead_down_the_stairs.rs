@@ -1,4 +1,4 @@
-//! The house stands as `docs/architecture.md` says:
+//! The house stands as `docs/project/architecture.md` says:
 //!
 //! 1. The page names every crate and every room, and no other.
 //! 2. A crate depends only on crates below it.
@@ -15,7 +15,7 @@ fn root() -> PathBuf {
 }
 
 fn today() -> (House, Order) {
-    let order = Order::read(&root().join("docs/architecture.md")).expect("the page is there");
+    let order = Order::read(&root().join("docs/project/architecture.md")).expect("the page is there");
     (House::read(&root()).expect("the sources can be read"), order)
 }
 
@@ -69,7 +69,7 @@ fn rooms_import_from_rooms_below() {
         let steps = order.rooms.iter().find(|(name, _)| *name == found.name).map_or(&[][..], |(_, steps)| steps);
         wrong.extend(faults(found, steps));
     }
-    assert!(wrong.is_empty(), "imports against the order of docs/architecture.md:\n{}", wrong.join("\n"));
+    assert!(wrong.is_empty(), "imports against the order of docs/project/architecture.md:\n{}", wrong.join("\n"));
 }
 
 #[test]
