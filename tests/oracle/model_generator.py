@@ -24,7 +24,7 @@ def element(name, attributes, children=()):
 
 
 class Generator:
-    """Draws a model. It uses only features that `docs/physics.md` lists as supported."""
+    """Draws a model. It uses only features that `docs/reference/mjcf.md` lists as supported."""
 
     def __init__(self, seed):
         self.rng = np.random.default_rng([2026, seed])

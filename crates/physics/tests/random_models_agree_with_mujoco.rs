@@ -1,10 +1,10 @@
 //! Contract: randomly generated models agree with MuJoCo.
 //!
-//! `tests/oracle/random_models.py` draws models from everything that `docs/physics.md` lists as supported: every joint,
+//! `tests/oracle/random_models.py` draws models from everything that `docs/reference/mjcf.md` lists as supported: every joint,
 //! shape, actuator, tendon, constraint, sensor, integrator and option, in any combination. Each compiles to MuJoCo's
 //! numbers. On random states, double precision has MuJoCo's mass matrix, bias, applied and constraint forces,
 //! accelerations, contacts, sensors and next state to 1e-5, and mostly to 1e-12. Single precision has those of double
-//! precision to 1e-2. One thing is left out (`docs/physics.md` names it): constraint forces on bodies that can only
+//! precision to 1e-2. One thing is left out (`docs/research/physics-agreement.md` names it): constraint forces on bodies that can only
 //! turn about their centers of mass, and welds on bodies that can only slide. For those, single precision has the
 //! motion of double precision, not the forces. Where an acceleration differs, the oracle computes which result is
 //! closer to the minimum of MuJoCo's own problem. It counts as MuJoCo's error if Marathon's is closer by far.
