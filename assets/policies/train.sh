@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Trains the policies of this folder again, by the README's commands, with one thread, and draws their pictures for the
-# documentation. Prints the rows of the table in docs/benchmarks.md. Needs python3 for the rows.
+# documentation. Prints the rows of the table in docs/research/benchmarks.md. Needs python3 for the rows.
 #
 #     assets/policies/train.sh [hopper walker2d ant humanoid]
 set -euo pipefail

@@ -1,5 +1,5 @@
 //! Every key of a native file: where it stands, what it may be, and what it means. Files are checked against this table,
-//! `docs/configs.md` prints it, and a test compares it with the fields of `TrainConfig`.
+//! `docs/reference/configs.md` prints it, and a test compares it with the fields of `TrainConfig`.
 
 use super::section::Range;
 use Kind::{Count, Flag, Number, Optional, Pair, Schedule, Text, Widths, Word, Words};
@@ -114,7 +114,7 @@ pub const KEYS: &[Key] = &[
         RUN,
         "policy_average",
         FRACTION,
-        "the run hands out [the mean of the policies](learning.md#policies-from-policies) of its latest part: 0.1 means the last tenth; 0 means the last policy alone",
+        "the run hands out [the mean of the policies](../how-to/resume.md#average-policies) of its latest part: 0.1 means the last tenth; 0 means the last policy alone",
     ),
     key(RUN, "seed", Count(0, u64::MAX), "seed of everything random"),
     key(RUN, "threads", Count(0, 65_536), "threads; 0 means one per processor. The result does not depend on it"),
@@ -200,7 +200,7 @@ pub const KEYS: &[Key] = &[
         PPO,
         "value_warmup",
         Count(0, MOST),
-        "rollouts at the start in which the value function learns alone, for a run that [starts from a policy](learning.md#policies-from-policies)",
+        "rollouts at the start in which the value function learns alone, for a run that [starts from a policy](../how-to/resume.md#fine-tune-a-policy)",
     ),
     key(ON_POLICY, "gae_lambda", FRACTION, "decay of generalized advantage estimation"),
     key(ON_POLICY, "entropy_coef", Schedule(Range::NotNegative), "weight of the entropy bonus"),

@@ -9,7 +9,7 @@
 //! `loaded` puts it over what `presets` has for the task. `mlagents` reads the other files. `section` is what both read
 //! values with.
 //!
-//! `docs/configs.md` has the tables of all keys.
+//! `docs/reference/configs.md` has the tables of all keys.
 
 mod document;
 mod error;

@@ -1,4 +1,4 @@
-//! The reference of all keys, as Markdown. `docs/configs.md` has it, and a test compares the two.
+//! The reference of all keys, as Markdown. `docs/reference/configs.md` has it, and a test compares the two.
 
 use super::keys::{ALGORITHMS, KEYS, Key, REWARDS};
 use super::loaded::default_of;
@@ -14,7 +14,7 @@ const GROUPS: [(&str, &str, &[&str]); 6] = [
     ("`statistics`", "How observations and rewards are normalized.", &["statistics"]),
     (
         "`rewards`",
-        "One section for each reward. `task` is there always, the [others](learning.md#rewards-beside-the-tasks) if they are \
+        "One section for each reward. `task` is there always, the [others](../explanation/algorithms.md#additional-rewards) if they are \
          named; `amp: null` takes one of the preset away. A column has the default of each.",
         REWARDS,
     ),

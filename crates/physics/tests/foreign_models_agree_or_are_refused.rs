@@ -10,7 +10,7 @@
 //! tolerance. The accelerations then agree within that tolerance, and everything agrees to 1e-8 when both sides solve
 //! to the end.
 //!
-//! `MARATHON_MODELS=FOLDER` tests the models of a folder instead. `docs/models.md` lists the result of each file. The
+//! `MARATHON_MODELS=FOLDER` tests the models of a folder instead. `docs/research/models.md` lists the result of each file. The
 //! test fails if the list is out of date; run it with `MARATHON_BLESS=1` to update the list.
 
 mod common;
@@ -292,24 +292,25 @@ fn table(rows: &[Row], same: usize, empty: usize) -> String {
 const INTRODUCTION: &str = "\
 # Models that were tried
 
-Every model file of the Python packages that the tests install, and what became of it. This page is written by
-[`foreign_models_agree_or_are_refused.rs`](../crates/physics/tests/foreign_models_agree_or_are_refused.rs), which fails
-when it is out of date:
+This page lists every model file of the Python packages that the tests install, with its result. The test
+[`foreign_models_agree_or_are_refused`](../../crates/physics/tests/foreign_models_agree_or_are_refused.rs) writes it, and fails when it is
+out of date:
 
-```sh
+```text
 MARATHON_BLESS=1 cargo test --release -p marathon-physics --test foreign_models_agree_or_are_refused
 ```
 
-*Agrees* means: in 20 random states (poses within the joints' limits and a little beyond, any orientation, random
-velocities and controls; parts may be deep inside each other), acceleration, constraint forces, number of contacts,
-sensors and the next state equal those of MuJoCo in double precision, under the file's own settings of the solver. Where its
-cap ends MuJoCo's iteration early, that is the point where it ends. Where it lets the iteration converge, accelerations under
-the file's own settings are equal within its tolerance, and everything is equal when both solve to the end. The column
-*error* is a bound on the largest relative error of all of these. Left out, and drawn again, are states in which MuJoCo itself has no
-definite answer: accelerations above 1e8, or a change of position by 1e-9 that changes the contacts or moves the
-acceleration by more than 1e-4.
+The test draws 20 random states of each model: poses within the joint limits and a little beyond, any orientation, random velocities and
+controls. A model *agrees* if these quantities equal MuJoCo's in double precision, under the file's own solver settings:
 
-The loader refuses a model with the message shown, before anything is simulated.
+* acceleration, constraint forces, number of contacts, sensors and the next state;
+* after the same number of iterations, where the file's cap ends MuJoCo's iteration early;
+* within the file's tolerance where the iteration converges, and to rounding when both solve to the end.
+
+The column *error* bounds the largest relative error of all these. States in which MuJoCo has no definite answer are drawn again: those
+with accelerations above 1e8, and those in which a change of position by 1e-9 changes the contacts or the acceleration by more than 1e-4.
+
+A refused model is refused by the loader, with the message shown.
 
 ";
 
@@ -366,7 +367,7 @@ fn foreign_models_agree_or_are_refused() {
                     failures.push(format!("{}: MuJoCo loads it, but: {}", file.id, refusal.why));
                 }
                 let verdict = if error.is_some() { BROKEN } else { REFUSED };
-                (verdict, format!("refused: {}", refusal.why.replace('|', "\\|")))
+                (verdict, format!("refused: {}", refusal.why.replace('|', "\\|").replace('<', "&lt;")))
             }
             (Outcome::Loads(_), Some(error)) => {
                 failures.push(format!("{}: loads, but MuJoCo refuses it: {error}", file.id));
@@ -452,19 +453,19 @@ fn disagreement(id: &str, model: &Model, a: &Agreement) -> Option<String> {
     (!wrong.is_empty()).then(|| format!("{id}: disagrees with MuJoCo: {}", wrong.join(", ")))
 }
 
-/// Compares `docs/models.md` with the expected text, or writes it.
+/// Compares `docs/research/models.md` with the expected text, or writes it.
 fn check_document(text: &str, failures: &mut Vec<String>) {
-    let path = common::workspace().join("docs/models.md");
+    let path = common::workspace().join("docs/research/models.md");
     if std::env::var_os("MARATHON_BLESS").is_some_and(|v| v == "1") {
-        std::fs::write(&path, text).expect("docs/models.md can be written");
+        std::fs::write(&path, text).expect("docs/research/models.md can be written");
         return;
     }
     let committed = std::fs::read_to_string(&path).unwrap_or_default();
     let (want, have) = (without_measurements(text), without_measurements(&committed));
     let different = want.iter().zip(&have).find(|(a, b)| a != b);
     if let Some((want, have)) = different {
-        failures.push(format!("docs/models.md is out of date (MARATHON_BLESS=1 writes it):\n- {have}\n+ {want}"));
+        failures.push(format!("docs/research/models.md is out of date (MARATHON_BLESS=1 writes it):\n- {have}\n+ {want}"));
     } else if want.len() != have.len() {
-        failures.push("docs/models.md is out of date (MARATHON_BLESS=1 writes it): its length differs".into());
+        failures.push("docs/research/models.md is out of date (MARATHON_BLESS=1 writes it): its length differs".into());
     }
 }

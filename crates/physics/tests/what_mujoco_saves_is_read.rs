@@ -1,7 +1,7 @@
 //! The loader reads MuJoCo's output: a model that loads still loads after MuJoCo has saved it.
 //!
 //! MuJoCo's writer expands includes, classes and shortcuts in its own way. MuJoCo saves every public model that the
-//! tests install (see `docs/models.md`) with `MjSpec.to_xml`, the writer of `mj_saveLastXML`. If the loader accepts the
+//! tests install (see `docs/research/models.md`) with `MjSpec.to_xml`, the writer of `mj_saveLastXML`. If the loader accepts the
 //! original, it accepts the saved file, and compiles it to MuJoCo's model. The loader also knows every element and
 //! attribute of MuJoCo's schema, which the writer can emit. It may refuse one by name, but does not report it as a
 //! spelling mistake.

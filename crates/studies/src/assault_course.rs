@@ -155,7 +155,7 @@ pub fn run(options: &Options, only: [&[String]; 3], kept_only: bool) -> Result<R
 
 fn about() -> String {
     format!(
-        "Figures learn to run by PPO with `terrain-fast.yaml` on seven kinds of [ground](../environments/terrain.md): *flat*; *random*, \
+        "Figures learn to run by PPO with `terrain-fast.yaml` on seven kinds of [ground](../reference/environments/terrain.md): *flat*; *random*, \
          mixed courses of any difficulty; *curriculum*, mixed courses that become harder; *adversary*, built ahead by a second \
          learner that earns what the runner loses; *bounded*, the same with steps of at most half a meter; *rising*, the same \
          with steps whose bound rises with the runner's way, from level ground on; *regret*, built by one that earns what a reference \

@@ -133,7 +133,7 @@ pub fn run(options: &Options, peers: &PeerOptions) -> Result<Record, StudyError>
                 episodes with the best actions of all agents (the original scored one agent, and A2C and ACKTR not at all), \
                 mean and deviation over the seeds. A hopper that stands upright to the end earns some 490, so whatever has \
                 that return at no speed stands still; how to get from there to hopping, and in how many steps, is in \
-                [Learning](../learning.md#the-floor-under-the-standard-deviation). The settings of Baselines start with a \
+                [Experiments](../research/learning.md#settings-of-other-libraries). The settings of Baselines start with a \
                 deviation of 1, with which a third of all actions is clipped and motors at their limits cost more than \
                 staying up brings; ML-Agents starts with a third. The rows with deviation 0.5 differ in nothing else, but \
                 for the rate that A2C needs, and for networks that follow the statistics of observations, as those with \
