@@ -305,7 +305,7 @@ controls. A model *agrees* if these quantities equal MuJoCo's in double precisio
 
 * acceleration, constraint forces, number of contacts, sensors and the next state;
 * after the same number of iterations, where the file's cap ends MuJoCo's iteration early;
-* within the file's tolerance where the iteration converges, and to rounding when both solve to the end.
+* within the file's tolerance where the iteration converges, and to 1e-8 when both solve to the end.
 
 The column *error* bounds the largest relative error of all these. States in which MuJoCo has no definite answer are drawn again: those
 with accelerations above 1e8, and those in which a change of position by 1e-9 changes the contacts or the acceleration by more than 1e-4.

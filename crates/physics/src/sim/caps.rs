@@ -4,8 +4,8 @@ use super::options::SimOptions;
 use crate::model::{Model, Solver};
 
 /// Caps below this are followed exactly, because MuJoCo's Newton solver may not have converged by then. In 6,700 steps
-/// from random states of 186 models of `docs/models.md`, it needs at most 25 iterations, and at most 10 in 99.5 % of
-/// the steps.
+/// from random states of 186 models of `docs/research/models.md`, it needs at most 25 iterations, and at most 10 in
+/// 99.5 % of the steps.
 pub(crate) const LEAST_ORDINARY_CAP: usize = 50;
 
 /// Solver settings of models whose iteration cap stops the solver before it converges.

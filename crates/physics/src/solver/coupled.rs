@@ -14,8 +14,8 @@
 //! identity, so nothing changes there, to the bit.
 //!
 //! There are two alternatives. Splitting `|j2 - j1|^2 <= 2 |j1|^2 + 2 |j2|^2` keeps the tree and needs no small matrix,
-//! but costs several times as many iterations. A dense factorization of H costs about twice the recursion before the
-//! first contact (`docs/physics.md` has the numbers).
+//! but costs several times as many iterations: 3.4 us for a step of the humanoid with self-collision, against 1.4 us. A
+//! dense factorization of H costs about twice the recursion for 27 degrees of freedom, before the first contact.
 
 use crate::algebra::planar::{Full, Planar, Space};
 use crate::algebra::spatial::V6;
