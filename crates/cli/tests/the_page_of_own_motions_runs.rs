@@ -1,4 +1,4 @@
-//! Every command of docs/own-motion.md runs as printed, on recordings with another skeleton, units and axes, and the
+//! Every command of docs/tutorials/own-motion.md runs as printed, on recordings with another skeleton, units and axes, and the
 //! results match the motion of the recordings. Only trainings are shorter, and pictures smaller. Commands that open a
 //! window or need other programs are left out.
 
@@ -44,7 +44,7 @@ fn blocks<'a>(page: &'a str, language: &str) -> Vec<&'a str> {
 
 #[test]
 fn the_commands_run_as_printed() {
-    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/own-motion.md");
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/tutorials/own-motion.md");
     let page = std::fs::read_to_string(page).unwrap();
     let temp = tempfile::tempdir().unwrap();
     let folder = temp.path();
