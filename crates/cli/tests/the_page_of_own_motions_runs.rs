@@ -1,6 +1,6 @@
-//! Every command of docs/tutorials/own-motion.md runs as printed, on recordings with another skeleton, units and axes, and the
-//! results match the motion of the recordings. Only trainings are shorter, and pictures smaller. Commands that open a
-//! window or need other programs are left out.
+//! Every command of docs/tutorials/own-motion.md runs as printed, on recordings with another skeleton, units and axes,
+//! and the results match the motion of the recordings. Only trainings are shorter, and pictures smaller. Commands that
+//! open a window or need other programs are left out.
 
 mod common;
 #[path = "common/foreign.rs"]
