@@ -1,6 +1,6 @@
 //! Time from a device's event to the command, compared with the character's response time. With only a dead zone and a
 //! curve, it is a frame and a decision. Smoothing adds 2.3 times its time until 90 % of the command. This test prints
-//! the table in `docs/game.md`.
+//! the table in `docs/reference/game.md`.
 
 #[path = "../../bevy_marathon/tests/common/devices.rs"]
 mod devices;
