@@ -1,6 +1,6 @@
 """Plays Marathon agents in MuJoCo and computes their observations, rewards and terminations in plain Python.
 
-Written from the environments' pages in docs/environments, not from the Rust code. Reads one JSON object from stdin:
+Written from the environments' pages in docs/reference/environments, not from the Rust code. Reads one JSON object from stdin:
 
     {"agents": [{"id": "Hopper-v0", "xml": "...", "frame_skip": 4,
                  "episodes": [{"qpos": [...], "qvel": [...], "actions": [[...], ...]}, ...]}, ...]}

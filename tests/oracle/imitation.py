@@ -1,6 +1,6 @@
 """Plays Marathon Man, or another figure, in MuJoCo beside a motion clip and computes observations, rewards and terminations in plain Python.
 
-Written from docs/environments/marathon-man.md and in-style.md, not from the Rust code. Reads one JSON object from stdin:
+Written from docs/reference/environments/marathon-man.md and in-style.md, not from the Rust code. Reads one JSON object from stdin:
 
     {"cases": [{"figure": "marathon_man", "xml": "...", "frame_skip": 5, "control": "pd", "action_scale": 0.5, "reward": "deepmimic", "distance": 0.5,
                 "episodes": [{"qpos": [...], "qvel": [...], "actions": [[...], ...],
