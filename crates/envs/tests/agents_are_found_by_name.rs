@@ -29,7 +29,7 @@ fn an_unknown_name_gets_the_nearest_ones() {
         let expected = format!("agent '{name}' does not exist{near}; the most similar of {count}: {five}");
         assert_eq!(id(name), expected);
     };
-    let five = "Hopper-v0, Hopper-v1, Hopper-v5, hopper-hop-v0, HopperController-v0";
+    let five = "Hopper-v0, Hopper-v1, Hopper-v5, hopper-hop-v0, hopper-stand-v0";
     similar("hoper", "; did you mean 'Hopper-v0'?", five);
     let five = "Humanoid-v0, Humanoid-v1, Humanoid-v5, humanoid-run-v0, humanoid-walk-v0";
     similar("Humanoid-v3", "; did you mean 'Humanoid-v0'?", five);

@@ -464,7 +464,8 @@ fn check_document(text: &str, failures: &mut Vec<String>) {
     let (want, have) = (without_measurements(text), without_measurements(&committed));
     let different = want.iter().zip(&have).find(|(a, b)| a != b);
     if let Some((want, have)) = different {
-        failures.push(format!("docs/research/models.md is out of date (MARATHON_BLESS=1 writes it):\n- {have}\n+ {want}"));
+        failures
+            .push(format!("docs/research/models.md is out of date (MARATHON_BLESS=1 writes it):\n- {have}\n+ {want}"));
     } else if want.len() != have.len() {
         failures.push("docs/research/models.md is out of date (MARATHON_BLESS=1 writes it): its length differs".into());
     }

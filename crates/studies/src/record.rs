@@ -60,7 +60,7 @@ impl Record {
         let Options { seeds, threads, .. } = options;
         let steps = options.steps.map_or(String::new(), |steps| format!(" --steps {steps}"));
         text += &format!(
-            "\n![{}]({}.png)\n\n```sh\ncargo run --release -p marathon-studies -- {} --seeds {seeds}{steps} --threads {threads}{}\n```\n\n\
+            "\n![{}]({}.png)\n\n```text\ncargo run --release -p marathon-studies -- {} --seeds {seeds}{steps} --threads {threads}{}\n```\n\n\
              Marathon {}, {}, {} thread{}, instruction set {}{}. Seconds are processor time of all threads unless said \
              otherwise.\n",
             self.title,

@@ -2,19 +2,17 @@
 
 use crate::commands::play;
 use crate::error::CliError;
+use marathon_envs::registry;
 use marathon_physics::lanes::Isa;
-use marathon_physics::{Batch, BatchOptions};
 use marathon_runs::python;
+use marathon_runs::speed::{env_speed, median};
 use marathon_runs::terminal::{print_json, say};
 use serde::Serialize;
 use std::path::Path;
 use std::process::Command;
-use std::time::{Duration, Instant};
 
-/// Physics steps of one agent between two looks at the clock.
-const STEPS: usize = 20;
-/// Time of the speed measurement.
-const MEASURE: Duration = Duration::from_millis(300);
+/// Processor time of the speed measurement, s.
+const MEASURE: f64 = 0.5;
 
 /// A part of the computer.
 #[derive(Serialize)]
@@ -28,7 +26,7 @@ struct Finding {
 /// Inspects the computer and prints the findings.
 ///
 /// # Errors
-/// If the built-in model cannot be simulated, which would be a defect.
+/// If the hopper's environment cannot be made, which would be a defect.
 pub fn run(json: bool) -> Result<(), CliError> {
     let findings = [
         finding(
@@ -80,21 +78,11 @@ fn instruction_sets() -> Finding {
     Finding { name: "instruction set", found, missing: best.obstacle().unwrap_or_default().into() }
 }
 
-/// Physics steps per second of one core.
+/// Speed of the hopper's environment on one core, by processor time.
 fn speed() -> Result<String, CliError> {
-    let model = marathon_envs::agent("hopper")?.model()?;
-    let lanes = Isa::best().lanes();
-    let mut batch =
-        Batch::new(&model, &BatchOptions { agents: lanes, ..BatchOptions::default() }).expect("its model is simulated");
-    let ctrl = vec![0.0; model.nu * lanes];
-    batch.step(&ctrl, STEPS);
-    let (start, mut steps) = (Instant::now(), 0);
-    while start.elapsed() < MEASURE {
-        batch.step(&ctrl, STEPS);
-        steps += STEPS * lanes;
-    }
-    let rate = steps as f64 / start.elapsed().as_secs_f64();
-    Ok(format!("{:.1} million physics steps of the hopper per second on one core", rate / 1e6))
+    let factory = registry::factory("hopper", Isa::best())?;
+    let seconds = median(&env_speed(1, MEASURE, &*factory).samples).cpu_per_step();
+    Ok(format!("{:.1} million environment steps of the hopper per second on one core", 1e-6 / seconds))
 }
 
 fn python_of_tests() -> Finding {
