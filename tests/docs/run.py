@@ -9,7 +9,7 @@ Blocks of a page run in their order: `python` in one process, `sh` with `bash -e
 `marathon config show TASK --config FILE`. Comments directly above a block:
 
     <!-- test: skip, REASON -->    does not run
-    <!-- test: long -->            runs with --long alone, for at most 600 s; other blocks run for at most 60 s
+    <!-- test: long -->            runs with --long alone, for at most 600 s; other blocks run for at most 240 s
     <!-- test: file NAME -->       is written to a file of the page's folder; for any language
     <!-- test: task TASK -->       task of a configuration; without, the first one that it names, or the hopper
 """
@@ -29,7 +29,7 @@ from executors import PythonSession, Tools, configuration, shell
 from notebooks import cells
 
 ROOT = Path(__file__).resolve().parents[2]
-LIMIT, LONG_LIMIT = 60.0, 600.0
+LIMIT, LONG_LIMIT = 240.0, 600.0
 SLOW = 20.0
 """Seconds after which a block is to have the mark of long ones."""
 NOTEBOOK = ".ipynb"
