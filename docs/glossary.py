@@ -18,6 +18,8 @@ from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
+from generator import help_text
+
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs/reference/glossary.md"
 LEFT_OUT = {"self", "cls", "args", "kwargs", "help", "version"}
@@ -32,9 +34,11 @@ def output(*command: str) -> str:
 
 def command_line(program: str, *path: str) -> Iterator[Found]:
     """Commands and long options, from the help of a command and its subcommands."""
-    text = output(program, *path, "--help")
-    commands = re.findall(r"^  ([a-z][\w-]*)", text.partition("\nCommands:\n")[2].partition("\n\n")[0], re.MULTILINE)
-    for word in [*commands, *re.findall(r"^ +(?:-\w, )?--([a-z][\w-]*)", text, re.MULTILINE)]:
+    sections = help_text.read(program, path).sections
+    commands = [entry.name for entry in sections.get("Commands", [])]
+    names = [entry.name for entries in sections.values() for entry in entries]
+    options = [long[1] for name in names if (long := re.match(r"(?:-\w, )?--([a-z][\w-]*)", name))]
+    for word in [*commands, *options]:
         yield word, "command line", " ".join(path) or "marathon"
     for command in commands:
         # the game is a program of its own, which need not be built: its source has the options

@@ -1,5 +1,6 @@
-//! Sets `cfg(without_fma)` if scalar kernels are needed for x86-64 processors without fused multiply-add: with the
-//! feature `baseline`, or if this very processor has none. Those kernels take a third of the compile time.
+//! Sets `cfg(without_fma)` where scalar kernels do not ask the processor for fused multiply-add: on all processors but
+//! x86-64, and there with the feature `baseline` or if this very processor has none. On x86-64, those kernels take a third
+//! of the compile time.
 
 use std::env::var;
 
@@ -8,7 +9,7 @@ fn main() {
     println!("cargo::rustc-check-cfg=cfg(without_fma)");
     let x86 = var("CARGO_CFG_TARGET_ARCH").is_ok_and(|arch| arch == "x86_64");
     let for_this_processor = var("TARGET").ok() == var("HOST").ok() && !has_fma();
-    if x86 && (var("CARGO_FEATURE_BASELINE").is_ok() || for_this_processor) {
+    if !x86 || var("CARGO_FEATURE_BASELINE").is_ok() || for_this_processor {
         println!("cargo::rustc-cfg=without_fma");
     }
 }

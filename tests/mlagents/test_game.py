@@ -31,7 +31,7 @@ DT = 0.02
 @pytest.fixture
 def screen():
     """A display that no other program uses."""
-    words = ["Xvfb", "-displayfd", "1", "-screen", "0", "1280x720x24", "-nolisten", "tcp"]
+    words = ["Xvfb", "-displayfd", "1", "-noreset", "-screen", "0", "1280x720x24", "-nolisten", "tcp"]
     xvfb = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     yield f":{xvfb.stdout.readline().strip()}"
     xvfb.kill()

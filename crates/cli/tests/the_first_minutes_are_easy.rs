@@ -1,5 +1,8 @@
-//! The first minutes of a newcomer: training ends with a video, `doctor` reports the computer, shells complete commands,
-//! the help of the game needs no game, a misspelled task gets few names, and a longer run says which schedules change.
+//! The first minutes of a newcomer:
+//!
+//! - Training ends with a video, and a longer run says which schedules change.
+//! - `doctor` reports the computer, and shells complete commands.
+//! - The help of the game needs no game, and a misspelled task gets few names.
 
 mod common;
 

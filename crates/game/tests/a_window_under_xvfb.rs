@@ -9,7 +9,6 @@ use std::error::Error;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
@@ -29,18 +28,16 @@ fn start(command: &mut Command) -> Result<Running, Box<dyn Error>> {
     Ok(Running(child))
 }
 
-/// The screen: a display for this test alone.
+/// A display for this test alone. Xvfb picks a free number and tells it once it accepts connections. Without `-noreset` it
+/// would restart after its last client, and refuse the next one meanwhile.
 fn screen() -> Result<(Running, String), Box<dyn Error>> {
-    static SCREENS: AtomicU32 = AtomicU32::new(0);
-    let display = format!(":{}", 200 + 2 * (std::process::id() % 300) + SCREENS.fetch_add(1, Ordering::Relaxed));
-    let xvfb = start(Command::new("Xvfb").args([&display, "-screen", "0", "640x400x24", "-nolisten", "tcp"]))?;
-    let socket = format!("/tmp/.X11-unix/X{}", &display[1..]);
-    let begun = Instant::now();
-    while !Path::new(&socket).exists() {
-        std::thread::sleep(Duration::from_millis(50));
-        assert!(begun.elapsed() < Duration::from_secs(20), "no virtual screen");
-    }
-    Ok((xvfb, display))
+    let mut xvfb = Command::new("Xvfb");
+    xvfb.args(["-displayfd", "1", "-noreset", "-screen", "0", "640x400x24", "-nolisten", "tcp"]);
+    let mut xvfb = start(xvfb.stdout(Stdio::piped()))?;
+    let mut number = String::new();
+    BufReader::new(xvfb.0.stdout.take().ok_or("no output")?).read_line(&mut number)?;
+    assert!(!number.trim().is_empty(), "no virtual screen");
+    Ok((xvfb, format!(":{}", number.trim())))
 }
 
 /// Output of the game, line by line.

@@ -301,11 +301,11 @@ fn refuse(out: &Path) -> Result<(), RunError> {
 fn kind_of_entry(name: &OsStr) -> Option<bool> {
     let name = name.to_str()?;
     let files = [LOCK, RUN, PROGRESS, "policy.safetensors", "summary.json", "curve.png"];
-    let numbered = name.starts_with("policy-") || name.starts_with(EVENTS) || name.ends_with(".motion");
-    let video = name.ends_with(".gif");
+    let starts = ["policy-", EVENTS].iter().any(|start| name.starts_with(start));
+    let ends = [".motion", ".gif"].iter().any(|end| name.ends_with(end));
     match name {
         CHECKPOINT | POLICIES => Some(true),
-        _ if files.contains(&name) || numbered || video || is_leftover(name.as_ref()) => Some(false),
+        _ if files.contains(&name) || starts || ends || is_leftover(name.as_ref()) => Some(false),
         _ => None,
     }
 }

@@ -317,15 +317,16 @@ fn stopped(folder: &RunFolder, cause: RunError, saved: bool, steps: u64) -> RunE
 /// Schedules that jump when a run that has made some of its steps gets another length: they span the whole run.
 fn stretched(config: &TrainConfig, done: u64, steps: u64) -> Option<String> {
     let mut moves = Vec::new();
-    let at = |total: u64| Progress { iteration: 0, steps: done, total_steps: total };
+    let progress = |total_steps| Progress { iteration: 0, steps: done, total_steps };
+    let [before, after] = [config.run.total_steps, steps].map(progress);
     let value = serde_json::to_value(config).unwrap_or_default();
     walk(&value, "", &mut |key, schedule| {
-        let [was, is] = [config.run.total_steps, steps].map(|total| at(total).at(schedule));
+        let (was, is) = (before.at(schedule), after.at(schedule));
         if (was - is).abs() > 1e-3 * was.abs() {
             moves.push(format!("{key} from {} to {}", rounded(was), rounded(is)));
         }
     });
-    (done > 0 && !moves.is_empty()).then(|| {
+    (!moves.is_empty()).then(|| {
         let list = moves.join(", ");
         format!("the schedules span the new length, so they change now: {list}; the return may drop at first")
     })

@@ -9,7 +9,7 @@ mod controller;
 pub mod env;
 mod gait;
 mod mujoco;
-mod options;
+pub mod options;
 mod physics;
 mod plan;
 mod row;

@@ -80,7 +80,8 @@ impl Head {
     }
 }
 
-fn cores() -> usize {
+/// Processors that this program may use.
+pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, |n| n.get())
 }
 

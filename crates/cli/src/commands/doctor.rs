@@ -1,5 +1,6 @@
 //! `marathon doctor`: what this computer offers, and what is missing for each part of Marathon.
 
+use crate::bench::options::{cores, isas};
 use crate::commands::play;
 use crate::error::CliError;
 use marathon_envs::registry;
@@ -66,14 +67,13 @@ fn finding(name: &'static str, found: String) -> Finding {
 fn processor() -> String {
     let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
-    let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
-    format!("{}{cores} cores", model.map(|(_, name)| format!("{name}, ")).unwrap_or_default())
+    format!("{}{} cores", model.map(|(_, name)| format!("{name}, ")).unwrap_or_default(), cores())
 }
 
 /// The instruction sets that this program supports here; the fastest one runs everything.
 fn instruction_sets() -> Finding {
     let best = Isa::best();
-    let known: Vec<&str> = Isa::ALL.into_iter().filter(|isa| isa.supported()).map(Isa::name).collect();
+    let known: Vec<&str> = isas(&[]).into_iter().map(Isa::name).collect();
     let found = format!("{} ({} agents at a time); available: {}", best.name(), best.lanes(), known.join(", "));
     Finding { name: "instruction set", found, missing: best.obstacle().unwrap_or_default().into() }
 }

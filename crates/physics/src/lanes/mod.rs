@@ -30,7 +30,7 @@ const NEEDS_FMA: &str = "this processor has no fused multiply-add (FMA), and thi
     that have it; build it on this machine, or with the feature `baseline` of marathon-physics";
 
 /// Ends a program that ignored [`Isa::obstacle`].
-#[cfg(all(target_arch = "x86_64", not(without_fma)))]
+#[cfg(not(without_fma))]
 #[cold]
 fn needs_fma() -> ! {
     panic!("{NEEDS_FMA}")

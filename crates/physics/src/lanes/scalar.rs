@@ -12,15 +12,15 @@ macro_rules! scalar_backend {
             const ISA: &'static str = $isa;
 
             fn supported() -> bool {
-                #[cfg(all(target_arch = "x86_64", not(without_fma)))]
+                #[cfg(not(without_fma))]
                 return std::arch::is_x86_feature_detected!("fma");
-                #[cfg(not(all(target_arch = "x86_64", not(without_fma))))]
+                #[cfg(without_fma)]
                 return true;
             }
             #[inline]
             fn enter<K: Kernel<Self>>(kernel: K) -> K::Output {
                 // a function that is not inlined is compiled once, and shared by all crates
-                #[cfg(any(not(target_arch = "x86_64"), without_fma))]
+                #[cfg(without_fma)]
                 #[inline(never)]
                 fn plain<K: Kernel<$t>>(kernel: K) -> K::Output {
                     kernel.run()
@@ -38,9 +38,9 @@ macro_rules! scalar_backend {
                         return unsafe { with_fma(kernel) };
                     }
                 }
-                #[cfg(any(not(target_arch = "x86_64"), without_fma))]
+                #[cfg(without_fma)]
                 return plain(kernel);
-                #[cfg(all(target_arch = "x86_64", not(without_fma)))]
+                #[cfg(not(without_fma))]
                 super::needs_fma();
             }
             #[inline(always)]
