@@ -28,7 +28,7 @@ pub fn env(error: EnvError) -> PyErr {
 pub fn learn(error: Error) -> PyErr {
     let text = error.to_string();
     match &error {
-        Error::Config { field, found, expected } if field == "agents" => {
+        Error::Config { field, found, expected } if field == "run.agents" => {
             value(format!("num_envs is {found}, expected {expected}"))
         }
         Error::Io { source, .. } if source.kind() == ErrorKind::NotFound => PyFileNotFoundError::new_err(text),
