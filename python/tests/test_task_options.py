@@ -43,7 +43,8 @@ def test_a_policy_plays_the_task_it_was_trained_for(mine: Path, tmp_path: Path) 
     assert own == evaluate(shipped.policy, 16) == evaluate(again, 16)
     assert own == evaluate(policy, 16, start="adaptive")
     assert own != evaluate(policy, 16, start="first")
-    longer = train(resume=tmp_path / "run", steps=1024)
+    with pytest.warns(UserWarning, match="the schedules span the new length"):
+        longer = train(resume=tmp_path / "run", steps=1024)
     assert longer.steps == 1024
 
 
