@@ -20,7 +20,7 @@ GROUPS = {
 ARGUMENTS = {"Streams": "_arrays"}
 """Classes that functions of the user receive, with the private modules that define them."""
 ADAPTERS = ("sb3", "pettingzoo", "rsl_rl", "skrl", "dm_env")
-MODULES = ("memory", "ray", "judge", *(f"adapters.{name}" for name in ADAPTERS))
+MODULES = ("memory", "ray", "compare_gymnasium", *(f"adapters.{name}" for name in ADAPTERS))
 """Public modules beside the package itself."""
 INTRODUCTION = """\
 # Python API

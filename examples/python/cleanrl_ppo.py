@@ -47,13 +47,13 @@ def mlp(inputs: int, outputs: int, scale: float) -> nn.Sequential:
     return net
 
 
-def learn(task: str, steps: int, agents: int, seed: int) -> list[float]:  # noqa: PLR0915 (to be read in one go)
+def learn(task: str, steps: int, num_envs: int, seed: int) -> list[float]:  # noqa: PLR0915 (to be read in one go)
     """Learn a task; returns the mean returns of the episodes that ended, rollout by rollout."""
     torch.manual_seed(seed)
     # networks this small are slower on several threads
     torch.set_num_threads(1)
     mode = gymnasium.vector.AutoresetMode.SAME_STEP
-    envs = gymnasium.make_vec(f"marathon_rl/{task}", num_envs=agents, autoreset_mode=mode, copy=False)
+    envs = gymnasium.make_vec(f"marathon_rl/{task}", num_envs=num_envs, autoreset_mode=mode, copy=False)
     space = envs.single_action_space
     middle, half = torch.tensor((space.high + space.low) / 2), torch.tensor((space.high - space.low) / 2)
     obs_size, act_size = envs.single_observation_space.shape[0], space.shape[0]
@@ -71,8 +71,8 @@ def learn(task: str, steps: int, agents: int, seed: int) -> list[float]:  # noqa
         return torch.distributions.Normal(actor(obs), log_std.exp()).log_prob(action).sum(-1)
 
     raw = tensor(envs.reset(seed=seed)[0])
-    total, discounted, history = torch.zeros(agents), torch.zeros(agents), []
-    iterations = max(1, steps // (HORIZON * agents))
+    total, discounted, history = torch.zeros(num_envs), torch.zeros(num_envs), []
+    iterations = max(1, steps // (HORIZON * num_envs))
     for iteration in range(iterations):
         optimizer.param_groups[0]["lr"] = 1e-3 * (1 - iteration / iterations)
         # act
@@ -81,12 +81,12 @@ def learn(task: str, steps: int, agents: int, seed: int) -> list[float]:  # noqa
         for _ in range(HORIZON):
             with torch.no_grad():
                 obs = normalize(raw)
-                action = actor(obs) + log_std.exp() * torch.randn(agents, act_size)
+                action = actor(obs) + log_std.exp() * torch.randn(num_envs, act_size)
                 chances = log_prob(obs, action)
             next_obs, reward, terminated, truncated, infos = envs.step((middle + half * action.clamp(-1, 1)).numpy())
             ended = torch.tensor(terminated | truncated)
             # the value of what would have followed an episode that was cut off
-            last_value = torch.zeros(agents)
+            last_value = torch.zeros(num_envs)
             for i in np.flatnonzero(truncated):
                 with torch.no_grad():
                     last_value[i] = critic(normalize(tensor(infos["final_obs"][i])[None]))[0, 0]
@@ -104,8 +104,8 @@ def learn(task: str, steps: int, agents: int, seed: int) -> list[float]:  # noqa
         rewards = batch["reward"] / (reward_scale.var + 1e-8).sqrt()
         with torch.no_grad():
             values = critic(batch["obs"])[..., 0]
-            following, advantage = critic(normalize(raw))[:, 0], torch.zeros(agents)
-        advantages = torch.zeros(HORIZON, agents)
+            following, advantage = critic(normalize(raw))[:, 0], torch.zeros(num_envs)
+        advantages = torch.zeros(HORIZON, num_envs)
         for t in reversed(range(HORIZON)):
             goes_on = (~batch["ended"][t]).float()
             target = rewards[t] + GAMMA * (goes_on * following + batch["last_value"][t])
@@ -116,7 +116,7 @@ def learn(task: str, steps: int, agents: int, seed: int) -> list[float]:  # noqa
 
         # improve
         for _ in range(EPOCHS):
-            for rows in torch.randperm(HORIZON * agents).chunk(MINIBATCHES):
+            for rows in torch.randperm(HORIZON * num_envs).chunk(MINIBATCHES):
                 x = {name: values[rows] for name, values in flat.items()}
                 ratio = (log_prob(x["obs"], x["action"]) - x["log_prob"]).exp()
                 gain = (x["advantage"] - x["advantage"].mean()) / (x["advantage"].std() + 1e-8)
@@ -131,7 +131,7 @@ def learn(task: str, steps: int, agents: int, seed: int) -> list[float]:  # noqa
 
         if returns:
             history.append(float(np.mean(returns)))
-            done = (iteration + 1) * HORIZON * agents
+            done = (iteration + 1) * HORIZON * num_envs
             print(f"{done:9,} steps, {len(returns):4} episodes, return {history[-1]:8.1f}", flush=True)
     return history
 
@@ -140,6 +140,6 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("--task", default="Hopper-v0")
     parser.add_argument("--steps", type=int, default=1_000_000, help="steps of all agents together")
-    parser.add_argument("--agents", type=int, default=64)
+    parser.add_argument("--agents", dest="num_envs", type=int, default=64)
     parser.add_argument("--seed", type=int, default=1)
     learn(**vars(parser.parse_args()))

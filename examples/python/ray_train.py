@@ -38,7 +38,7 @@ def main(words: Sequence[str] | None = None) -> str:
         if args.kill and row["iteration"] == 2:
             workers.kill(0)
 
-    result = train(args.task, workers=workers, agents=args.agents, steps=args.steps, seed=1, callback=report)
+    result = train(args.task, workers=workers, num_envs=args.agents, steps=args.steps, seed=1, callback=report)
     workers.close()
     print(f"workers replaced: {workers.replaced}")
     if result.evaluation:

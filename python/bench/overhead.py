@@ -57,20 +57,20 @@ def microseconds(f: Callable[[], Any], repeats: int) -> float:
     return float(np.median(times)) / 1e3
 
 
-def gymnasium_step(task: str, agents: int, mode: AutoresetMode, ends: int, repeats: int = 400) -> float:
+def gymnasium_step(task: str, num_envs: int, mode: AutoresetMode, ends: int, repeats: int = 400) -> float:
     """Measure `MarathonVectorEnv.step` without the native step, in which `ends` episodes end."""
-    envs = gymnasium.make_vec(f"marathon_rl/{task}", num_envs=agents, autoreset_mode=mode, threads=1)
+    envs = gymnasium.make_vec(f"marathon_rl/{task}", num_envs=num_envs, autoreset_mode=mode, threads=1)
     envs.reset(seed=1)
     actions = np.zeros(envs.action_space.shape, np.float32)
     obs, reward, terminated, truncated = envs._env.step(actions)
-    terminated[:], truncated[:] = np.arange(agents) < ends, False
+    terminated[:], truncated[:] = np.arange(num_envs) < ends, False
     envs._env = Standin(envs._env, (obs, reward, terminated, truncated))
     return microseconds(lambda: envs.step(actions), repeats)
 
 
 def native_step(repeats: int = 2000) -> float:
     """Measure a step of `VecEnv` with next to no physics."""
-    env = marathon_rl.VecEnv("InvertedPendulum-v5", 1, threads=1)
+    env = marathon_rl.VecEnv("InvertedPendulum-v5", 1, threads=1, autoreset="same_step", dtype="float32")
     env.reset(1)
     actions = np.zeros((1, 1), np.float32)
     return microseconds(lambda: env.step(actions), repeats)

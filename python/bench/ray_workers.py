@@ -63,7 +63,7 @@ def main() -> None:
                 rows.append(float(row["steps"] or 0))
                 return len(rows) <= args.rollouts
 
-            train(args.task, workers=workers, agents=args.agents, callback=note)
+            train(args.task, workers=workers, num_envs=args.agents, callback=note)
             workers.close()
             # the first rollout has the making of the actors in it
             rates.append([rows[0] / statistics.median(s) for s in zip(*workers.seconds[1:], strict=True)])

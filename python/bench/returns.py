@@ -1,4 +1,4 @@
-"""Trains Gymnasium's tasks natively and with Stable-Baselines3, and judges every policy in the installed Gymnasium.
+"""Trains Gymnasium's tasks natively and with Stable-Baselines3, and compares every policy in the installed Gymnasium.
 
     $ python python/bench/returns.py docs/studies/gymnasium-returns.csv
 
@@ -24,7 +24,7 @@ import gymnasium
 import numpy as np
 
 import marathon_rl
-from marathon_rl.judge import Act, judge
+from marathon_rl.compare_gymnasium import Act, compare
 
 TASKS = ["Hopper-v5", "Walker2d-v5", "HalfCheetah-v5", "Ant-v5", "Humanoid-v5"]
 # the return that a task is to reach, and the processor seconds it may take
@@ -124,8 +124,8 @@ def stable_baselines3(task: str, trainer: str, settings: dict[str, Any], seed: i
 
 def row(run: tuple[str, str, int], steps: int, seconds: float, act: Act) -> dict[str, str]:
     """A line about the policy of a run: a task, a trainer and a seed."""
-    verdict = judge(run[0], act)
-    here, there = verdict.marathon, verdict.gymnasium
+    comparison = compare(run[0], act)
+    here, there = comparison.marathon, comparison.gymnasium
     of = [
         *(*run, steps, f"{seconds:.1f}"),
         *(f"{here.mean:.1f}", f"{here.half_width:.1f}", here.falls),

@@ -58,7 +58,7 @@ class Side:
 
 def marathon(task: str, num_envs: int, threads: int) -> Side:
     """Ours."""
-    env = marathon_rl.VecEnv(task, num_envs, threads=threads, autoreset="same_step")
+    env = marathon_rl.VecEnv(task, num_envs, threads=threads, autoreset="same_step", dtype="float32")
     env.reset(seed=1)
     name = "marathon" if threads == 1 else f"marathon, {threads} threads"
     return Side(name, num_envs, env.step, actions(task, num_envs, np.float32), [], [])

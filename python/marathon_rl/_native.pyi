@@ -145,6 +145,9 @@ class Spec:
     def metrics(self) -> list[str]:
         """Names of the numbers that tell how well the task is done: some of `VecEnv.info`, and ``forward``."""
     @property
+    def dtype(self) -> Literal["float32", "float64"]:
+        """Type of the observations: "float64" for Gymnasium's own tasks, as there, and "float32" for all others."""
+    @property
     def observations(self) -> dict[str, slice]:
         """Parts of the observation by name, in their order: ``obs[:, spec.observations["touch"]]``."""
     @property
@@ -179,10 +182,10 @@ class VecEnv:
         seed: int = 0,
         threads: int = 0,
         isa: Literal["f64", "f32", "baseline", "avx2", "avx512"] | None = None,
-        autoreset: Literal["next_step", "same_step", "disabled"] | str = "same_step",
+        autoreset: Literal["next_step", "same_step", "disabled"] | str = "next_step",
         max_episode_steps: int | None = None,
         copy: bool = False,
-        dtype: Literal["float32", "float64"] | str = "float32",
+        dtype: Literal["float32", "float64"] | str | None = None,
         **options: Any,
     ) -> VecEnv:
         """Make an environment. The results depend on none of `threads`, `isa` (but for f64) and `copy`.
@@ -195,12 +198,13 @@ class VecEnv:
             threads: number of threads, at most 1024; 0 means one per processor core. There are never more than blocks
                 of 16 agents.
             isa: instruction set; None means the widest that the processor has.
-            autoreset: handling of agents whose episode ended. "same_step": `obs` is the first observation of the
-                next episode already, `final_obs` the last one of the old. "next_step": the next step ignores its action
-                and returns the first observation with reward 0. "disabled": nothing; use `reset(mask=...)`.
+            autoreset: handling of agents whose episode ended. "next_step": the next step ignores its action and
+                returns the first observation of the next episode with reward 0. "same_step": `obs` is that observation
+                already, `final_obs` the last one of the old episode. "disabled": nothing; use `reset(mask=...)`.
             max_episode_steps: steps after which an episode is truncated; None means the task's own number.
             copy: whether every step returns new arrays.
-            dtype: type of the observations. They are computed in 32 bits whatever it is.
+            dtype: type of the observations; None means that of the task, `Spec.dtype`. They are computed in 32 bits
+                whatever it is.
             **options: arguments of the task, see `Spec.options`.
         """
     @property
@@ -294,9 +298,9 @@ class VecEnv:
         gravity: npt.ArrayLike | None = None,
         mask: npt.ArrayLike | None = None,
     ) -> None:
-        """Give agents, all or those of a mask, constants of their own, for domain randomization.
+        """Set constants of all agents or those of a mask, for domain randomization.
 
-        They last over resets, until changed, and belong to snapshots. Constants that are not given are the model's own.
+        They last over resets, until changed, and belong to snapshots. Omitted constants have the model's values.
 
         Args:
             mass: factors of the bodies' masses and inertias, ``(num_envs, nbody)``.
@@ -318,22 +322,40 @@ class VecEnv:
             command: numbers within the ranges of `spec.command`, ``(num_envs, len(spec.command))``.
             mask: the agents, ``(num_envs,)``; None means all.
         """
-    def push(self, agent: int, body: int, force: Sequence[float], torque: Sequence[float] = ...) -> None:
-        """Push a body of an agent until told otherwise or until its next episode.
+    def push(
+        self,
+        force: npt.ArrayLike,
+        torque: npt.ArrayLike | None = None,
+        *,
+        body: int | str,
+        mask: npt.ArrayLike | None = None,
+    ) -> None:
+        """Push a body of all agents or those of a mask until changed or until the agent's next episode.
 
-        Force, N, and torque, N m, are in world axes at the body's center of mass. `model.body` knows the indices.
+        Both vectors are in world axes, at the body's center of mass.
+
+        Args:
+            force: force, N, ``(num_envs, 3)``.
+            torque: torque, N m, ``(num_envs, 3)``; None means none.
+            body: the body's name, or its index in ``model.body_names``.
+            mask: the agents, ``(num_envs,)``; None means all.
         """
-    def ground(self, agent: int, field: int = 0) -> npt.NDArray[np.float32]:
-        """An agent's ground: elevations, m above the zero of the model's height field, ``(nrow, ncol)``, a new array.
+    def ground(self, field: int = 0) -> npt.NDArray[np.float32]:
+        """Ground of each agent: elevations, m above the zero of a height field, ``(num_envs, nrow, ncol)``.
 
-        The first row has the smallest y. ``model.hfield`` knows the indices.
+        The array is new. Its first row has the smallest y. ``model.hfield`` finds the index of a field by its name.
         """
-    def set_ground(self, agent: int, field: int, elevations: npt.ArrayLike) -> None:
-        """Give an agent ground of its own: elevations, m above the zero of the model's height field.
+    def set_ground(self, elevations: npt.ArrayLike, field: int = 0, mask: npt.ArrayLike | None = None) -> None:
+        """Set the ground of all agents or those of a mask.
 
-        They are ``(nrow, ncol)``, or row after row; the first row has the smallest y. ``model.hfield_nrow`` and
-        ``hfield_ncol`` tell the size. The ground lasts over resets, until changed, but not in tasks that draw the
-        ground of every episode, such as ``TerrainWalker2d-v0``: there it lasts until the episode ends.
+        The first row has the smallest y. It lasts over resets, until changed. In tasks that draw the ground of every
+        episode, such as ``TerrainWalker2d-v0``, it lasts until the episode ends.
+
+        Args:
+            elevations: elevations, m above the zero of the height field: a grid for each agent, ``(num_envs, nrow,
+                ncol)``, or one for all, ``(nrow, ncol)``.
+            field: index of the height field.
+            mask: the agents, ``(num_envs,)``; None means all.
         """
     def save(self) -> bytes:
         """Everything that the future depends on.
@@ -352,16 +374,16 @@ class VecEnv:
 class Renderer:
     """Draws agents of one kind with a ray caster on the processor, followed by a camera. No window, no GPU."""
 
-    def __new__(cls, id: str, width: int = 480, height: int = 480, *, agents: int = 1, **options: Any) -> Renderer:
-        """Make a renderer for pictures of `width` x `height` pixels with `agents` agents side by side.
+    def __new__(cls, id: str, width: int = 480, height: int = 480, *, num_envs: int = 1, **options: Any) -> Renderer:
+        """Make a renderer for pictures of `width` x `height` pixels with `num_envs` agents side by side.
 
         `options` are arguments of the task, see `Spec.options`: some change the model.
         """
     @staticmethod
-    def of(model: Model, width: int = 480, height: int = 480, *, agents: int = 1) -> Renderer:
+    def of(model: Model, width: int = 480, height: int = 480, *, num_envs: int = 1) -> Renderer:
         """Make a renderer for a compiled model."""
     def render(self, qpos: npt.ArrayLike, elapsed: float = ...) -> npt.NDArray[np.uint8]:
-        """Draw agents side by side, their states in the rows of `qpos`, ``(agents, nq)``.
+        """Draw agents side by side, their states in the rows of `qpos`, ``(num_envs, nq)``.
 
         `elapsed` is the time since the last picture, s; the camera jumps to the agents at first and after more than a
         second. Returns ``(height, width, 3)``, sRGB.
@@ -421,19 +443,19 @@ class TrainResult:
         """The run in numbers, as in ``summary.json``."""
 
 def train(
-    task: str | type[MarathonAgent] | None = None,
+    task: str | type[MarathonAgent] | MarathonAgent | None = None,
     config: str | PathLike[str] | dict[str, Any] | None = None,
     *,
     callback: Callable[[dict[str, float | None]], bool | None] | None = None,
     seed: int | None = None,
     steps: int | None = None,
-    agents: int | None = None,
+    num_envs: int | None = None,
     threads: int | None = None,
     out: str | PathLike[str] | None = None,
     resume: str | PathLike[str] | None = None,
     players: Any = None,
-    options: dict[str, Any] | None = None,
     initialize_from: str | PathLike[str] | None = None,
+    **options: Any,
 ) -> TrainResult:
     """Train a policy with the native trainer, without the GIL, and evaluate it.
 
@@ -441,21 +463,24 @@ def train(
     `resume` goes on with it. The same seed gives the same policy, bit for bit, for any number of threads.
 
     Args:
-        task: its name, or a `MarathonAgent` class, whose functions are called once per decision for all agents.
+        task: its name, or a `MarathonAgent` class, whose functions are called once per step for all agents. An object
+            of the class stands for the class.
         config: a file, or a dictionary with the same keys, such as ``{"ppo": {"lr": 3e-4}}``. The task's preset holds
             for what it leaves out. A file of ML-Agents, or a dictionary like one, is imported.
         callback: called after every iteration with the numbers that ``progress.csv`` holds, such as ``steps``,
             ``return_mean`` (None if no episode ended), ``steps_per_second``; if it returns False, training stops.
         seed: seed of everything random.
         steps: steps of all agents together.
-        agents: agents that act side by side, a multiple of 16.
+        num_envs: number of agents, a multiple of 16.
         threads: number of threads; 0 means one per processor core.
         out: a new folder for everything that the command ``marathon train`` writes; None means that nothing is written.
         resume: the folder of a run to go on with, in place of a configuration; the task is needed for a class alone.
         players: an object that has the rollouts played elsewhere, as `marathon_rl.ray.Workers` does.
-        options: arguments of a task with a name, such as ``{"clip": "my.bvh"}``. A clip may be a `Clip` or a list, too.
         initialize_from: a policy to start from in place of random weights, a file or the folder of a run, whose hidden
             layers are no wider; it may observe less.
+        **options: options of the task, see `Spec.options`, such as ``clip="my.bvh"``. A clip may be a `Clip` or a list,
+            too. A class gets them as arguments of its constructor. A run notes the options of tasks with a name only:
+            pass those of a class again to `resume` and to `evaluate`.
     """
 
 @final
@@ -491,11 +516,11 @@ def evaluate(
     task: str | type[MarathonAgent] | MarathonAgent | None = None,
     seed: int = ...,
     threads: int = 0,
-    options: dict[str, Any] | None = None,
+    **options: Any,
 ) -> dict[str, float]:
     """Play whole episodes with a policy's best actions.
 
-    `task` is needed for a `MarathonAgent` class; without, it is the policy's own.
+    `task` is needed for a `MarathonAgent` class; without, it is the policy's own. `options` are options of the task.
 
     Returns ``return_mean``, ``return_std``, ``return_min``, ``return_max``, ``length_mean`` (decisions),
     ``distance_mean`` (m), ``speed_mean`` (m/s), ``falls``, ``diverged`` and ``episodes``.
@@ -509,10 +534,10 @@ class Model:
     """
 
     @staticmethod
-    def load(path: str | PathLike[str], /) -> Model:
+    def from_xml_path(path: str | PathLike[str], /) -> Model:
         """Read a model file; included files and height fields are looked up beside it."""
     @staticmethod
-    def parse(xml: str, /, name: str = "model") -> Model:
+    def from_xml_string(xml: str, /, name: str = "model") -> Model:
         """Compile a model given as text, which has no other files; `name` stands for the file in messages."""
     @property
     def name(self) -> str:
@@ -630,7 +655,7 @@ class Simulation:
     def __new__(
         cls,
         model: Model,
-        num_agents: int = 1,
+        num_envs: int = 1,
         *,
         threads: int = 0,
         isa: Literal["f64", "f32", "baseline", "avx2", "avx512"] | None = None,
@@ -639,7 +664,7 @@ class Simulation:
 
         Args:
             model: the model.
-            num_agents: number of agents.
+            num_envs: number of agents.
             threads: number of threads; 0 means one per processor core, but not more than one for every 64 agents.
             isa: instruction set; None means the widest that the processor has. The results do not depend on it (but for
                 f64) and on the number of threads.
@@ -648,43 +673,86 @@ class Simulation:
     def model(self) -> Model:
         """The model."""
     @property
-    def num_agents(self) -> int:
+    def num_envs(self) -> int:
         """Number of agents."""
     @property
     def threads(self) -> int:
         """Number of threads."""
     def step(self, ctrl: npt.ArrayLike, substeps: int = 1) -> npt.NDArray[np.bool_]:
-        """Advance every agent by `substeps` physics steps under `ctrl`, ``(num_agents, nu)``.
+        """Advance every agent by `substeps` physics steps under `ctrl`, ``(num_envs, nu)``.
 
-        Returns which agents broke, ``(num_agents,)``: their states stopped being finite, so they were put into the
+        Returns which agents broke, ``(num_envs,)``: their states stopped being finite, so they were put into the
         reference configuration at rest.
         """
     def reset(self, qpos: npt.ArrayLike, qvel: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> None:
         """Put agents, all or those of a mask, into states.
 
-        The states are rows of `qpos`, ``(num_agents, nq)``, and `qvel`, ``(num_agents, nv)``. Quaternions are
+        The states are rows of `qpos`, ``(num_envs, nq)``, and `qvel`, ``(num_envs, nv)``. Quaternions are
         normalized; controls, pushes and contacts are forgotten.
         """
-    def push(self, agent: int, body: int, force: Sequence[float], torque: Sequence[float] = ...) -> None:
-        """Push a body of an agent until told otherwise or reset.
+    def push(
+        self,
+        force: npt.ArrayLike,
+        torque: npt.ArrayLike | None = None,
+        *,
+        body: int | str,
+        mask: npt.ArrayLike | None = None,
+    ) -> None:
+        """Push a body of all agents or those of a mask until changed or until a reset.
 
-        Force, N, and torque, N m, are in world axes, at the body's center of mass.
+        Both vectors are in world axes, at the body's center of mass.
+
+        Args:
+            force: force, N, ``(num_envs, 3)``.
+            torque: torque, N m, ``(num_envs, 3)``; None means none.
+            body: the body's name, or its index in ``model.body_names``.
+            mask: the agents, ``(num_envs,)``; None means all.
         """
-    def set_ground(self, agent: int, field: int, elevations: npt.ArrayLike) -> None:
-        """Give an agent ground of its own: elevations, m above the zero of the model's height field.
+    def vary(
+        self,
+        *,
+        mass: npt.ArrayLike | None = None,
+        friction: npt.ArrayLike | None = None,
+        strength: npt.ArrayLike | None = None,
+        gravity: npt.ArrayLike | None = None,
+        mask: npt.ArrayLike | None = None,
+    ) -> None:
+        """Set constants of all agents or those of a mask, for domain randomization.
 
-        They are ``(nrow, ncol)``, or row after row; the first row has the smallest y. The ground lasts over resets,
-        until changed, and belongs to snapshots.
+        They last over resets, until changed, and belong to snapshots. Omitted constants have the model's values.
+
+        Args:
+            mass: factors of the bodies' masses and inertias, ``(num_envs, nbody)``.
+            friction: factors of all friction coefficients of contacts, ``(num_envs,)``.
+            strength: factors of the actuators' forces, ``(num_envs, nu)``.
+            gravity: gravity, m/s^2, ``(num_envs, 3)``.
+            mask: the agents, ``(num_envs,)``; None means all.
+        """
+    def ground(self, field: int = 0) -> npt.NDArray[np.float32]:
+        """Ground of each agent: elevations, m above the zero of a height field, ``(num_envs, nrow, ncol)``.
+
+        The array is new. Its first row has the smallest y. ``model.hfield`` finds the index of a field by its name.
+        """
+    def set_ground(self, elevations: npt.ArrayLike, field: int = 0, mask: npt.ArrayLike | None = None) -> None:
+        """Set the ground of all agents or those of a mask.
+
+        The first row has the smallest y. It lasts over resets, until changed, and belongs to snapshots.
+
+        Args:
+            elevations: elevations, m above the zero of the height field: a grid for each agent, ``(num_envs, nrow,
+                ncol)``, or one for all, ``(nrow, ncol)``.
+            field: index of the height field.
+            mask: the agents, ``(num_envs,)``; None means all.
         """
     def ground_height(self, x: npt.ArrayLike, y: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """Heights of the ground at places of the world, m, ``(num_agents, n)``.
+        """Heights of the ground at places of the world, m, ``(num_envs, n)``.
 
         It is the ground of planes and of height fields that lie level, with ground of each agent's own. Beyond all of
         it, the height is that of the nearest place; 0 if the model has no ground.
 
         Args:
-            x: places along x, m, ``(num_agents, n)``.
-            y: places along y, m, ``(num_agents, n)``.
+            x: places along x, m, ``(num_envs, n)``.
+            y: places along y, m, ``(num_envs, n)``.
         """
     def save(self) -> bytes:
         """Everything that the future depends on, as JSON. Loaded, the simulation continues with the same bits."""
@@ -692,40 +760,40 @@ class Simulation:
         """Restore what `save` returned for the same model and number of agents."""
     @property
     def qpos(self) -> npt.NDArray[np.float64]:
-        """Configuration, ``(num_agents, nq)``."""
+        """Configuration, ``(num_envs, nq)``."""
     @property
     def qvel(self) -> npt.NDArray[np.float64]:
-        """Velocity, ``(num_agents, nv)``."""
+        """Velocity, ``(num_envs, nv)``."""
     @property
     def body_pos(self) -> npt.NDArray[np.float64]:
-        """Origins of the bodies' frames, m, ``(num_agents, nbody, 3)``."""
+        """Origins of the bodies' frames, m, ``(num_envs, nbody, 3)``."""
     @property
     def body_axes(self) -> npt.NDArray[np.float64]:
-        """Directions of the bodies' x, y and z axes, ``(num_agents, nbody, 3, 3)``: ``[..., 0, :]`` is that of x."""
+        """Directions of the bodies' x, y and z axes, ``(num_envs, nbody, 3, 3)``: ``[..., 0, :]`` is that of x."""
     @property
     def body_velocity(self) -> npt.NDArray[np.float64]:
-        """Velocities of the origins of the bodies' frames, m/s, ``(num_agents, nbody, 3)``."""
+        """Velocities of the origins of the bodies' frames, m/s, ``(num_envs, nbody, 3)``."""
     @property
     def body_angular_velocity(self) -> npt.NDArray[np.float64]:
-        """Angular velocities of the bodies, rad/s, ``(num_agents, nbody, 3)``."""
+        """Angular velocities of the bodies, rad/s, ``(num_envs, nbody, 3)``."""
     @property
     def geom_pos(self) -> npt.NDArray[np.float64]:
-        """Centers of the geoms, m, ``(num_agents, ngeom, 3)``."""
+        """Centers of the geoms, m, ``(num_envs, ngeom, 3)``."""
     @property
     def geom_velocity(self) -> npt.NDArray[np.float64]:
-        """Velocities of the geoms' centers, m/s, ``(num_agents, ngeom, 3)``."""
+        """Velocities of the geoms' centers, m/s, ``(num_envs, ngeom, 3)``."""
     @property
     def touching(self) -> npt.NDArray[np.bool_]:
-        """Geoms that touched the static world at the last physics step, ``(num_agents, ngeom)``."""
+        """Geoms that touched the static world at the last physics step, ``(num_envs, ngeom)``."""
     @property
     def touched(self) -> npt.NDArray[np.bool_]:
-        """Geoms that touched the static world at any physics step of the last `step`, ``(num_agents, ngeom)``."""
+        """Geoms that touched the static world at any physics step of the last `step`, ``(num_envs, ngeom)``."""
     @property
     def normal_force(self) -> npt.NDArray[np.float64]:
-        """Normal forces of the geoms' contacts at the last physics step, N, ``(num_agents, ngeom)``."""
+        """Normal forces of the geoms' contacts at the last physics step, N, ``(num_envs, ngeom)``."""
     @property
     def sensors(self) -> npt.NDArray[np.float64]:
-        """Sensors' values at the present state and controls, in the model's order, ``(num_agents, ...)``.
+        """Sensors' values at the present state and controls, in the model's order, ``(num_envs, ...)``.
 
         NaN for those that cannot be evaluated. This costs about as much as a physics step.
         """

@@ -2,14 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from marathon_rl import _snapshots
 from marathon_rl._arrays import BoolArray, FloatArray, Streams
-from marathon_rl._native import CommandRange
+from marathon_rl._native import CommandRange, Model
 from marathon_rl.agents import MarathonAgent
 
 LARGEST = 1e6
@@ -46,6 +46,8 @@ class AgentSpec:
     command: list[CommandRange]
     options: dict[str, Any]
     """Arguments of the agent's constructor that were given."""
+    dtype: ClassVar[Literal["float32"]] = "float32"
+    """Type of the observations."""
 
 
 class AgentVecEnv:
@@ -56,6 +58,7 @@ class AgentVecEnv:
     """
 
     copy = True
+    dtype = AgentSpec.dtype
 
     def __init__(
         self,
@@ -65,7 +68,7 @@ class AgentVecEnv:
         seed: int = 0,
         threads: int = 0,
         isa: Any = None,
-        autoreset: str = "same_step",
+        autoreset: str = "next_step",
         max_episode_steps: int | None = None,
         copy: bool = True,
         **options: Any,
@@ -251,9 +254,41 @@ class AgentVecEnv:
             self.due[due] = steps[due] + np.maximum(np.asarray(holds, np.int64), 1)
         return np.where(self.commanded[:, None], self.given, self.scheduled)
 
-    def set_ground(self, agent: int, field: int, elevations: npt.ArrayLike) -> None:
-        """Give an agent ground of its own, as `Simulation.set_ground`: it lasts over resets, until changed."""
-        self.agent.sim.set_ground(agent, field, elevations)
+    @property
+    def model(self) -> Model:
+        """The compiled model: names and indices of bodies, actuators and height fields."""
+        return self.agent.model
+
+    def push(
+        self,
+        force: npt.ArrayLike,
+        torque: npt.ArrayLike | None = None,
+        *,
+        body: int | str,
+        mask: npt.ArrayLike | None = None,
+    ) -> None:
+        """Push a body of all agents or those of a mask, as `VecEnv.push`."""
+        self.agent.sim.push(force, torque, body=body, mask=mask)
+
+    def vary(
+        self,
+        *,
+        mass: npt.ArrayLike | None = None,
+        friction: npt.ArrayLike | None = None,
+        strength: npt.ArrayLike | None = None,
+        gravity: npt.ArrayLike | None = None,
+        mask: npt.ArrayLike | None = None,
+    ) -> None:
+        """Set constants of all agents or those of a mask, as `VecEnv.vary`."""
+        self.agent.sim.vary(mass=mass, friction=friction, strength=strength, gravity=gravity, mask=mask)
+
+    def ground(self, field: int = 0) -> npt.NDArray[np.float32]:
+        """Return the ground of each agent, `(N, nrow, ncol)`, as `VecEnv.ground`."""
+        return self.agent.sim.ground(field)
+
+    def set_ground(self, elevations: npt.ArrayLike, field: int = 0, mask: npt.ArrayLike | None = None) -> None:
+        """Set the ground of all agents or those of a mask. It lasts over resets, until changed."""
+        self.agent.sim.set_ground(elevations, field, mask)
 
     def set_command(self, command: npt.ArrayLike | None, mask: npt.ArrayLike | None = None) -> None:
         """Tell agents what to do, or give them back to their schedule with None, as `VecEnv.set_command`."""

@@ -85,16 +85,16 @@ class MarathonAgent:
     memory_size: ClassVar[int] = 0
     """Number of variables that an agent keeps from decision to decision, see `remember`."""
 
-    def __init__(self, num_agents: int = 1, *, threads: int = 0, isa: Any = None) -> None:
+    def __init__(self, num_envs: int = 1, *, threads: int = 0, isa: Any = None) -> None:
         """Load the model and put all agents into the spawn pose. `threads` and `isa` are those of `Simulation`."""
-        self.num_agents = num_agents
+        self.num_envs = num_envs
         self.model = self.load_model()
-        self.sim = Simulation(self.model, num_agents, threads=threads, isa=isa)
-        self.action: FloatArray = np.zeros((num_agents, self.model.nu))
+        self.sim = Simulation(self.model, num_envs, threads=threads, isa=isa)
+        self.action: FloatArray = np.zeros((num_envs, self.model.nu))
         """Actions of the last decision, as `controls` says, `(N, nu)`; zero at the start of an episode."""
-        self.memory: FloatArray = np.zeros((num_agents, self.memory_size))
+        self.memory: FloatArray = np.zeros((num_envs, self.memory_size))
         """The agents' own variables, `(N, memory_size)`; at the start of an episode zero, or from `agent_reset`."""
-        self.command: FloatArray = np.zeros((num_agents, len(self.commands)))
+        self.command: FloatArray = np.zeros((num_envs, len(self.commands)))
         """Commands of the agents, `(N, len(commands))`.
 
         In `observations` it is what to do from now on, elsewhere what the decision was made under.
@@ -266,7 +266,7 @@ class MarathonAgent:
         its own ground. Beyond all of it, the height is that of the nearest place; 0 if the model has none.
         """
         x, y = np.broadcast_arrays(x, y)
-        shape = x.shape or (self.num_agents,)
+        shape = x.shape or (self.num_envs,)
         rows = shape if len(shape) == 2 else (shape[0], 1)
         x, y = (np.broadcast_to(places, shape).reshape(rows) for places in (x, y))
         return self.sim.ground_height(x, y).reshape(shape)
@@ -364,7 +364,7 @@ class MarathonAgent:
 
     def terminate_never(self) -> BoolArray:
         """No agent (`TerminateNever`)."""
-        return np.zeros(self.num_agents, np.bool_)
+        return np.zeros(self.num_envs, np.bool_)
 
     def terminate_on_non_foot_contact(self) -> BoolArray:
         """Where a geom that is not of `feet` touched the ground in the decision (`TerminateOnNonFootHitTerrain`)."""
@@ -400,7 +400,8 @@ class MarathonAgent:
         if source is None:
             raise TypeError(f"{cls.__name__} has no model: set the class attribute mjcf to a path or MJCF text")
         text = fspath(source)
-        return Model.parse(text, cls.__name__) if text.lstrip().startswith("<") else Model.load(text)
+        is_text = text.lstrip().startswith("<")
+        return Model.from_xml_string(text, cls.__name__) if is_text else Model.from_xml_path(text)
 
     @classmethod
     def task_id(cls) -> str:

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from marathon_rl import _native, _tasks
 from marathon_rl._native import Policy
 from marathon_rl._tasks import Task
+from marathon_rl.agents import MarathonAgent
 
 # most agents that play side by side, and the default seed: those of the native evaluation
 MOST_AGENTS = 1024
@@ -19,7 +20,7 @@ def evaluate(
     policy: Policy | Callable[[npt.NDArray[np.float32]], npt.ArrayLike],
     episodes: int = 100,
     *,
-    task: Task | None = None,
+    task: Task | MarathonAgent | None = None,
     seed: int = SEED,
     threads: int = 0,
     **options: Any,
@@ -33,10 +34,12 @@ def evaluate(
         policy: a `Policy`, or a function from observations, `(n, obs_size)`, float32, to actions, `(n, act_size)`, in
             the units of the task.
         episodes: number of episodes.
-        task: name of the task or a `MarathonAgent` class; without, it is the policy's own. A function has none.
+        task: name of the task or a `MarathonAgent` class; without, it is the policy's own. A function has none. An
+            object of the class stands for the class.
         seed: seed of the environments.
         threads: number of threads; 0 means one per processor core. The result does not depend on it.
-        **options: arguments of the task, and `max_episode_steps`. The others are those that a policy was trained with.
+        **options: options of the task, and `max_episode_steps`. Those of a task with a name that are not given are the
+            ones that the policy was trained with.
 
     Returns:
         `return_mean`, `return_std`, `return_min`, `return_max`, `length_mean` (decisions), `distance_mean` (m),
@@ -44,7 +47,7 @@ def evaluate(
     """
     native = isinstance(task, str | None) and "max_episode_steps" not in options
     if isinstance(policy, Policy) and (native or not options):
-        return _native.evaluate(policy, episodes, task=task, seed=seed, threads=threads, options=options)
+        return _native.evaluate(policy, episodes, task=task, seed=seed, threads=threads, **options)
     if not callable(policy):
         raise TypeError(f"policy is of type {type(policy).__name__}, expected a Policy or a function")
     if episodes < 1:
@@ -54,12 +57,13 @@ def evaluate(
             raise TypeError("task is missing: a function does not tell which task it is for")
         task = policy.task
         options = {**policy.options, **options}
-    agents = min(episodes, MOST_AGENTS)
-    env = _tasks.vec_env(task, agents, threads=threads, autoreset="same_step", **options)
-    # agent i plays episodes i, i + agents, ...
-    quota = np.arange(episodes - 1, episodes - 1 - agents, -1) // agents + 1
-    total, length, distance = np.zeros((3, agents))
-    played: list[list[tuple[float, float, float, bool, bool]]] = [[] for _ in range(agents)]
+    num_envs = min(episodes, MOST_AGENTS)
+    of = type(task) if isinstance(task, MarathonAgent) else task
+    env = _tasks.vec_env(of, num_envs, threads=threads, autoreset="same_step", **options)
+    # agent i plays episodes i, i + num_envs, ...
+    quota = np.arange(episodes - 1, episodes - 1 - num_envs, -1) // num_envs + 1
+    total, length, distance = np.zeros((3, num_envs))
+    played: list[list[tuple[float, float, float, bool, bool]]] = [[] for _ in range(num_envs)]
     missing, obs = episodes, env.reset(seed)
     while missing:
         obs, reward, terminated, truncated = env.step(np.asarray(policy(obs), np.float32))

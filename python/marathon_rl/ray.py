@@ -162,12 +162,12 @@ def train(
     callback: Callable[[dict[str, float | None]], bool | None] | None = None,
     seed: int | None = None,
     steps: int | None = None,
-    agents: int | None = None,
+    num_envs: int | None = None,
     threads: int | None = None,
     out: str | PathLike[str] | None = None,
     resume: str | PathLike[str] | None = None,
-    options: dict[str, Any] | None = None,
     initialize_from: str | PathLike[str] | None = None,
+    **options: Any,
 ) -> TrainResult:
     """Train as `marathon_rl.train` does, with rollouts played by Ray's workers; the policy has the same bits.
 
@@ -182,14 +182,14 @@ def train(
         callback: called after every iteration with its numbers, as in `marathon_rl.train`.
         seed: seed of everything random.
         steps: steps of all agents together.
-        agents: agents that act side by side, a multiple of 16. Many of them make up for the time that messages take.
+        num_envs: number of agents, a multiple of 16. Many of them make up for the time that messages take.
         threads: threads of the learner, which waits while the workers play and plays the final evaluation; 0 means one
             per processor core.
         out: a new folder for everything that the command ``marathon train`` writes; None means that nothing is written.
         resume: the folder of a run to go on with, in place of a task and a configuration. It may have been begun
             without Ray, and may go on without.
-        options: arguments of the task.
         initialize_from: a policy to start from in place of random weights, a file or the folder of a run.
+        **options: options of the task, see `marathon_rl.spec(task).options`.
     """
     players = workers if isinstance(workers, Workers) else Workers(workers)
     try:
@@ -199,13 +199,13 @@ def train(
             callback=callback,
             seed=seed,
             steps=steps,
-            agents=agents,
+            num_envs=num_envs,
             threads=threads,
             out=out,
             resume=resume,
-            options=options,
             initialize_from=initialize_from,
             players=players,
+            **options,
         )
     finally:
         if players is not workers:

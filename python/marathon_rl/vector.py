@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from marathon_rl import _snapshots, _spaces, _tasks
-from marathon_rl._native import Renderer
+from marathon_rl._native import Model, Renderer
 from marathon_rl._spaces import BoolArray, FloatArray
 from marathon_rl._tasks import Task
 
@@ -227,9 +227,50 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         if self._x is not None:
             infos["x_velocity"], infos["_x_velocity"] = distance / self.task_spec.dt, mask
 
+    @property
+    def model(self) -> Model:
+        """The compiled model: names and indices of bodies, actuators and height fields."""
+        return self._env.model
+
+    @property
+    def command(self) -> FloatArray:
+        """Command in each agent's current observation, `(num_envs, len(task_spec.command))`, a new array."""
+        return self._env.command
+
     def set_command(self, command: npt.ArrayLike | None, mask: npt.ArrayLike | None = None) -> None:
-        """Tell agents, all or those of a mask, what to do in place of their schedule, as `VecEnv.set_command`."""
+        """Set the commands of all agents or those of a mask, as `VecEnv.set_command`. None returns to the schedule."""
         self._env.set_command(command, mask)
+
+    def push(
+        self,
+        force: npt.ArrayLike,
+        torque: npt.ArrayLike | None = None,
+        *,
+        body: int | str,
+        mask: npt.ArrayLike | None = None,
+    ) -> None:
+        """Push a body of all agents or those of a mask, as `VecEnv.push`."""
+        self._env.push(force, torque, body=body, mask=mask)
+
+    def vary(
+        self,
+        *,
+        mass: npt.ArrayLike | None = None,
+        friction: npt.ArrayLike | None = None,
+        strength: npt.ArrayLike | None = None,
+        gravity: npt.ArrayLike | None = None,
+        mask: npt.ArrayLike | None = None,
+    ) -> None:
+        """Set constants of all agents or those of a mask, as `VecEnv.vary`."""
+        self._env.vary(mass=mass, friction=friction, strength=strength, gravity=gravity, mask=mask)
+
+    def ground(self, field: int = 0) -> npt.NDArray[np.float32]:
+        """Return the ground of each agent, `(num_envs, nrow, ncol)`, as `VecEnv.ground`."""
+        return self._env.ground(field)
+
+    def set_ground(self, elevations: npt.ArrayLike, field: int = 0, mask: npt.ArrayLike | None = None) -> None:
+        """Set the ground of all agents or those of a mask, as `VecEnv.set_ground`."""
+        self._env.set_ground(elevations, field, mask)
 
     def save(self) -> bytes:
         """Everything that the episodes to come depend on; of wrappers, nothing."""

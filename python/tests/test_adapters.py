@@ -186,7 +186,7 @@ class TestRslRl:
         from marathon_rl.adapters.rsl_rl import RslRlEnv  # noqa: PLC0415
 
         env = RslRlEnv("ant", 20, seed=5, max_episode_steps=10)
-        native = marathon_rl.VecEnv("ant", 20, max_episode_steps=10)
+        native = marathon_rl.VecEnv("ant", 20, max_episode_steps=10, autoreset="same_step")
         assert np.array_equal(env.get_observations()["policy"], native.reset(seed=5))
         env.episode_length_buf[3] = 6
         for step in range(10):
@@ -242,7 +242,7 @@ class TestSkrl:
 
         env, native = (
             SkrlEnv("ant", 9, seed=5, max_episode_steps=4),
-            marathon_rl.VecEnv("ant", 9, max_episode_steps=4),
+            marathon_rl.VecEnv("ant", 9, max_episode_steps=4, autoreset="same_step"),
         )
         assert np.array_equal(env.reset()[0], native.reset(seed=5))
         for _ in range(9):

@@ -357,7 +357,7 @@ def test_streams_are_uniform_independent_and_repeatable() -> None:
 
 
 def test_a_simulation_reads_what_mujoco_calls_by_the_same_names() -> None:
-    model = Model.load(ASSETS / "hopper.xml")
+    model = Model.from_xml_path(ASSETS / "hopper.xml")
     assert model.actuator_names == ["waist", "hip", "knee", "ankle"] and model.nu == 4
     assert model.joint_type[:3] == ["slide", "slide", "hinge"] and model.sensor("foot") == (0, 1)
     sim = Simulation(model, 5, threads=2)
@@ -383,7 +383,7 @@ def test_a_simulation_reads_what_mujoco_calls_by_the_same_names() -> None:
     sim.reset(qpos, qvel, mask)
     assert not sim.touching[0].any() and sim.touching[1:].any(1).all()
     sim.load(saved)
-    sim.push(0, model.body("torso"), (500, 0, 0))
+    sim.push(np.tile([500, 0, 0], (5, 1)), body="torso", mask=np.arange(5) == 0)
     sim.step(np.zeros((5, 4)))
     assert sim.qvel[0, 0] > sim.qvel[1, 0] + 0.05
     for call, message in [
@@ -391,11 +391,11 @@ def test_a_simulation_reads_what_mujoco_calls_by_the_same_names() -> None:
         (lambda: model.keyframe("x"), "no keyframe 'x'; known: spawn"),
         (lambda: sim.step(np.zeros((5, 3))), r"ctrl has the shape \(5, 3\), expected \(5, 4\)"),
         (lambda: sim.reset(qpos * np.nan, qvel), "state of agent 0 is not finite"),
-        (lambda: sim.push(5, 1, (1, 0, 0)), "agent is 5, expected less than 5"),
+        (lambda: sim.push(np.zeros((4, 3)), body=1), r"force has the shape \(4, 3\), expected \(5, 3\)"),
         (lambda: Simulation(model, 4).load(saved), "5 agents, expected 4"),
-        (lambda: Simulation(Model.load(ASSETS / "ant.xml"), 5).load(saved), "not of model 'ant'"),
-        (lambda: Model.parse("<mujoco>", "mine"), "mine"),
-        (lambda: Model.load("nowhere.xml"), "nowhere.xml"),
+        (lambda: Simulation(Model.from_xml_path(ASSETS / "ant.xml"), 5).load(saved), "not of model 'ant'"),
+        (lambda: Model.from_xml_string("<mujoco>", "mine"), "mine"),
+        (lambda: Model.from_xml_path("nowhere.xml"), "nowhere.xml"),
     ]:
         with pytest.raises(ValueError, match=message):
             call()

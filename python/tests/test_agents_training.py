@@ -17,6 +17,17 @@ class Leg(Arm):
         return [self.joint_velocities()]
 
 
+class Weighted(Arm):
+    """Its constructor takes an option."""
+
+    def __init__(self, num_envs: int = 1, *, weight: float = 1.0, **options: Any) -> None:
+        super().__init__(num_envs, **options)
+        self.weight = weight
+
+    def step_reward(self) -> dict[str, np.ndarray]:
+        return {"height": self.weight * (self.height("arm") / 0.15 + 1)}
+
+
 # 64 agents make 2048 steps per iteration
 CONFIG = {
     "run": {"agents": 64, "horizon": 32, "total_steps": 40_960},
@@ -104,6 +115,22 @@ def test_policies_of_classes_are_loaded(tmp_path: Path) -> None:
         evaluate(policy, 2, task=Leg)
 
 
+def test_a_class_takes_options_as_keywords() -> None:
+    assert Weighted.vec_env(2, weight=3).agent.weight == 3
+    settings: dict[str, Any] = {"steps": 2048, "seed": 1}
+    # nothing is paid for nothing, whatever the arms do
+    nothing = train(Weighted, CONFIG, weight=0, **settings)
+    assert nothing.evaluation is not None and nothing.evaluation["return_mean"] == 0
+    assert evaluate(nothing.policy, 16, task=Weighted)["return_mean"] != 0
+    assert evaluate(nothing.policy, 16, task=Weighted, weight=0)["return_mean"] == 0
+    # an object stands for its class
+    obs = Arm.vec_env(40).reset(seed=3)
+    by_class, by_object = (train(task, CONFIG, **settings).policy(obs) for task in (Arm, Arm()))
+    assert np.array_equal(by_class, by_object)
+    with pytest.raises(TypeError, match="weihgt"):
+        train(Weighted, CONFIG, weihgt=0, **settings)
+
+
 def test_what_goes_wrong_in_python_is_what_is_raised(tmp_path: Path) -> None:
     class Tired(Arm):
         decisions = 0
@@ -121,13 +148,13 @@ def test_what_goes_wrong_in_python_is_what_is_raised(tmp_path: Path) -> None:
         Tired.decisions = 0
         with pytest.raises(RuntimeError, match="enough"):
             train(Tired, CONFIG, threads=threads)
-    train(Arm, steps=1, agents=16).policy.save(tmp_path / "policy.safetensors")
+    train(Arm, steps=1, num_envs=16).policy.save(tmp_path / "policy.safetensors")
     with pytest.raises(RuntimeError, match="enough"):
         evaluate(load_policy(tmp_path / "policy.safetensors"), 2, task=type("Arm", (Tired,), {}))
     with pytest.raises(ValueError, match=r"nowhere\.xml"):
         train(Headless)
     for wrong in (5, object):
-        with pytest.raises(TypeError, match="expected a task's name or a MarathonAgent class"):
+        with pytest.raises(TypeError, match="expected a task's name or a MarathonAgent"):
             train(wrong)
     with pytest.raises(ValueError, match="Leg"):
         train(Leg, {"behaviors": {"Arm": {"max_steps": 1}}})

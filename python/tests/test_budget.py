@@ -33,11 +33,15 @@ class Pendulum(MarathonAgent):
         return {"still": -abs(self.sim.qvel[:, 0])}
 
 
+def push(body: int) -> None:
+    Simulation(Model.from_xml_string(PENDULUM)).push([[0, 0, 0]], body=body)
+
+
 MAKERS: dict[str, Callable[[int], Any]] = {
     "VecEnv": lambda n: VecEnv("hopper", n),
     "VecEnv of terrains": lambda n: VecEnv("TerrainWalker2d-v0", n),
     "MarathonVectorEnv": lambda n: MarathonVectorEnv("Hopper-v5", n),
-    "Simulation": lambda n: Simulation(Model.parse(PENDULUM), n),
+    "Simulation": lambda n: Simulation(Model.from_xml_string(PENDULUM), n),
     "MarathonAgent": Pendulum.vec_env,
 }
 
@@ -45,7 +49,9 @@ MAKERS: dict[str, Callable[[int], Any]] = {
 @pytest.mark.parametrize("name", MAKERS)
 def test_agents_beyond_the_budget_are_a_memory_error(name: str) -> None:
     make = MAKERS[name]
-    with pytest.raises(MemoryError, match=r"is 1000000000, which asks for .* GB; the limit 'agents_memory' is 16 GB"):
+    with pytest.raises(
+        MemoryError, match=r"num_envs is 1000000000, which asks for .* GB; the limit 'agents_memory' is 16 GB"
+    ):
         make(10**9)
     for n in (2**32, 2**62, 2**63, 2**64 - 1):
         with pytest.raises(ValueError, match=re.escape(f"is {n}, expected at most 4294967295")):
@@ -85,16 +91,22 @@ def test_the_budget_can_be_raised() -> None:
     [
         (lambda: VecEnv("hopper", 1, threads=10**6), "threads is 1000000, expected at most 1024"),
         (lambda: VecEnv("hopper", 1, threads=2**62), "threads is 4611686018427387904, expected at most"),
-        (lambda: Simulation(Model.parse(PENDULUM), 1, threads=10**6), "threads is 1000000, expected at most 1024"),
+        (
+            lambda: Simulation(Model.from_xml_string(PENDULUM), 1, threads=10**6),
+            "threads is 1000000, expected at most 1024",
+        ),
         (lambda: Renderer("hopper", 10**9, 10), "image size 1000000000x10 is out of range"),
         (lambda: Renderer("hopper", 2**62, 10), "width is 4611686018427387904, expected at most"),
         (lambda: Renderer("hopper", 10, -1), "height is -1, expected a whole number from 0"),
-        (lambda: Renderer.of(Model.parse(PENDULUM), 10, 10, agents=2**62), "agents is 4611686018427387904, expected"),
-        (lambda: train("hopper", agents=2**62), "agents is 4611686018427387904, expected at most"),
+        (
+            lambda: Renderer.of(Model.from_xml_string(PENDULUM), 10, 10, num_envs=2**62),
+            "num_envs is 4611686018427387904, expected",
+        ),
+        (lambda: train("hopper", num_envs=2**62), "num_envs is 4611686018427387904, expected at most"),
         (lambda: train("hopper", threads=2**62), "threads is 4611686018427387904, expected at most"),
         (lambda: VecEnv("hopper", 1, max_episode_steps=-1), "max_episode_steps is -1, expected a whole number"),
-        (lambda: Simulation(Model.parse(PENDULUM)).push(-1, 0, [0, 0, 0]), "agent is -1, expected a whole number"),
-        (lambda: Simulation(Model.parse(PENDULUM)).push(0, 2**62, [0, 0, 0]), "body is 4611686018427387904, expected"),
+        (lambda: push(-1), "body is -1, expected a whole number"),
+        (lambda: push(2**62), "body is 4611686018427387904, expected less than 2"),
     ],
 )
 def test_numbers_beyond_all_sense_are_refused_by_name(call: Callable[[], Any], message: str) -> None:
@@ -104,10 +116,10 @@ def test_numbers_beyond_all_sense_are_refused_by_name(call: Callable[[], Any], m
 
 def test_a_run_that_does_not_fit_is_a_memory_error() -> None:
     with pytest.raises(MemoryError, match="fewer agents"):
-        train("hopper", agents=32_000_000)
+        train("hopper", num_envs=32_000_000)
 
 
 def test_evaluate_refuses_more_episodes_than_make_sense() -> None:
-    policy = marathon_rl.train("hopper", agents=16, steps=16, threads=1).policy
+    policy = marathon_rl.train("hopper", num_envs=16, steps=16, threads=1).policy
     with pytest.raises(ValueError, match=r"episodes is 4611686018427387904, expected at most"):
         marathon_rl.evaluate(policy, episodes=2**62)

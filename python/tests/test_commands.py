@@ -75,7 +75,7 @@ def commanded(obs: np.ndarray) -> np.ndarray:
 
 
 def test_a_schedule_is_drawn_observed_and_rewarded() -> None:
-    carts = Cart.vec_env(N, seed=3)
+    carts = Cart.vec_env(N, seed=3, autoreset="same_step")
     obs, story = carts.reset(seed=3), []
     assert len(np.unique(obs[:, 1])) == N
     for decision in range(100):

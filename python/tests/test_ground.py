@@ -40,13 +40,13 @@ class Eye(MarathonAgent):
 
 def hills(agent: int) -> np.ndarray:
     """Hills of an agent's own, single precision as the physics keeps them."""
-    return np.random.default_rng(agent).uniform(0.01, 1.0, ROWS * COLUMNS).astype(np.float32)
+    return np.random.default_rng(agent).uniform(0.01, 1.0, (ROWS, COLUMNS)).astype(np.float32)
 
 
 def ray(agent: int, x: float, y: float) -> float:
     """Height at which a ray from above meets the ground in MuJoCo."""
     model = mujoco.MjModel.from_xml_string(MODEL)
-    model.hfield_data[:] = hills(agent)
+    model.hfield_data[:] = hills(agent).ravel()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     down = np.array([0.0, 0.0, -1.0])
@@ -55,8 +55,7 @@ def ray(agent: int, x: float, y: float) -> float:
 
 def eyes() -> Eye:
     agent = Eye(AGENTS)
-    for i in range(AGENTS):
-        agent.sim.set_ground(i, 0, hills(i))
+    agent.sim.set_ground(np.stack([hills(i) for i in range(AGENTS)]))
     return agent
 
 
@@ -95,10 +94,10 @@ def test_a_scan_turns_with_the_heading() -> None:
 
 def test_ground_lasts_over_resets_and_snapshots_and_is_stood_upon() -> None:
     env = Eye.vec_env(2, autoreset="disabled")
-    env.set_ground(1, 0, np.full(ROWS * COLUMNS, 0.875))
+    env.set_ground(np.full((ROWS, COLUMNS), 0.875), mask=[False, True])
     flat, raised = env.reset(seed=1)[:, 0]
     assert raised - flat == pytest.approx(0.875, abs=0.05)
-    again = Simulation(Model.parse(MODEL), 2)
+    again = Simulation(Model.from_xml_string(MODEL), 2)
     again.load(env.agent.sim.save())
     np.testing.assert_array_equal(again.ground_height(np.zeros((2, 1)), np.zeros((2, 1)))[:, 0], [0.125, 1.0])
     # they fall onto their own ground: the lower is still on its way when the other has landed
@@ -116,28 +115,31 @@ def test_ground_lasts_over_resets_and_snapshots_and_is_stood_upon() -> None:
 
 
 @pytest.mark.parametrize(
-    ("agent", "field", "elevations", "message"),
+    ("field", "elevations", "message"),
     [
-        (2, 0, np.zeros(35), "agent is 2, expected less than 2"),
-        (0, 1, np.zeros(35), "field is 1, expected less than 1"),
-        (0, 0, np.zeros(34), r"elevations have the shape \(34,\), expected \(5, 7\) or \(35,\)"),
-        (0, 0, np.zeros((7, 5)), r"elevations have the shape \(7, 5\), expected \(5, 7\) or \(35,\)"),
-        (0, 0, np.full(35, np.nan), "elevations have a number that is NaN"),
+        (1, np.zeros((5, 7)), "field is 1, expected less than 1"),
+        (0, np.zeros(35), r"elevations have the shape \(35,\), expected \(2, 5, 7\) or \(5, 7\)"),
+        (0, np.zeros((7, 5)), r"elevations have the shape \(7, 5\), expected \(2, 5, 7\) or \(5, 7\)"),
+        (0, np.zeros((1, 5, 7)), r"elevations have the shape \(1, 5, 7\), expected \(2, 5, 7\) or \(5, 7\)"),
+        (0, np.full((5, 7), np.nan), "elevations have a number that is NaN"),
     ],
 )
-def test_ground_that_does_not_fit_is_refused(agent: int, field: int, elevations: np.ndarray, message: str) -> None:
+def test_ground_that_does_not_fit_is_refused(field: int, elevations: np.ndarray, message: str) -> None:
+    sim = Simulation(Model.from_xml_string(MODEL), 2)
     with pytest.raises(ValueError, match=message):
-        Simulation(Model.parse(MODEL), 2).set_ground(agent, field, elevations)
+        sim.set_ground(elevations, field)
+    with pytest.raises(ValueError, match=r"mask has the shape \(3,\), expected \(2,\)"):
+        sim.set_ground(np.zeros((5, 7)), mask=np.ones(3, bool))
 
 
 def test_a_model_tells_the_size_of_its_height_fields() -> None:
-    model = Model.parse(MODEL)
+    model = Model.from_xml_string(MODEL)
     assert (model.hfield_names, model.hfield("hills")) == (["hills"], 0)
     assert (model.hfield_nrow.tolist(), model.hfield_ncol.tolist()) == ([ROWS], [COLUMNS])
     assert model.hfield_size.tolist() == [[3, 2, 1, 0.5]]
     with pytest.raises(ValueError, match="the model has no height field 'hill'; did you mean 'hills'"):
         model.hfield("hill")
-    assert Model.parse("<mujoco><worldbody/></mujoco>").hfield_size.shape == (0, 4)
+    assert Model.from_xml_string("<mujoco><worldbody/></mujoco>").hfield_size.shape == (0, 4)
 
 
 def test_ground_of_an_environment_lasts_as_long_as_its_task_draws_none() -> None:
@@ -145,27 +147,24 @@ def test_ground_of_an_environment_lasts_as_long_as_its_task_draws_none() -> None
     env = VecEnv("TerrainWalker2d-v0", 2, autoreset="disabled", seed=1)
     env.reset()
     rows, columns = env.model.hfield_nrow[0], env.model.hfield_ncol[0]
-    drawn = env.ground(0)
-    assert drawn.shape == (rows, columns)
+    drawn = env.ground()
+    assert drawn.shape == (2, rows, columns) and drawn.dtype == np.float32
     flat = np.zeros((rows, columns), np.float32)
-    for elevations in (flat, flat.ravel(), flat.tolist(), np.asfortranarray(flat.astype(float))):
-        env.set_ground(1, 0, elevations)
+    for elevations in (flat, flat.tolist(), np.asfortranarray(flat.astype(float)), np.stack([flat + 1, flat])):
+        env.set_ground(elevations, 0, [False, True])
     for _ in range(3):
         env.step(np.zeros((2, env.spec.act_size)))
-        np.testing.assert_array_equal(env.ground(1, 0), flat)
-        np.testing.assert_array_equal(env.ground(0), drawn)
+        np.testing.assert_array_equal(env.ground(0), [drawn[0], flat])
     env.reset(mask=[False, True])
-    assert not np.array_equal(env.ground(1), flat)
-    np.testing.assert_array_equal(env.ground(0), drawn)
-    for agent, field, message in ((2, 0, "agent is 2"), (0, 1, "field is 1, expected less than 1")):
-        with pytest.raises(ValueError, match=message):
-            env.set_ground(agent, field, flat)
-        with pytest.raises(ValueError, match=message.split(",")[0]):
-            env.ground(agent, field)
+    assert not np.array_equal(env.ground()[1], flat)
+    np.testing.assert_array_equal(env.ground()[0], drawn[0])
+    for call in (lambda: env.set_ground(flat, 1), lambda: env.ground(1)):
+        with pytest.raises(ValueError, match="field is 1, expected less than 1"):
+            call()
 
 
 def test_places_that_are_no_rows_of_agents_are_refused() -> None:
-    sim = Simulation(Model.parse(MODEL), 2)
+    sim = Simulation(Model.from_xml_string(MODEL), 2)
     with pytest.raises(ValueError, match=r"x has the shape \(3, 1\), expected \(2, 1\)"):
         sim.ground_height(np.zeros((3, 1)), np.zeros((3, 1)))
     with pytest.raises(ValueError, match=r"y has the shape \(2, 2\), expected \(2, 1\)"):

@@ -43,7 +43,7 @@ def test_an_exported_policy_acts_the_same(path: Path, tmp_path: Path) -> None:
     expected = policy(obs)
     np.testing.assert_allclose(run(file, obs, "deterministic_continuous_actions"), expected, atol=1e-5)
     # on states that matter, too
-    env = marathon_rl.VecEnv(policy.task, 64, **policy.meta.get("options", {}))
+    env = marathon_rl.VecEnv(policy.task, 64, dtype="float32", **policy.meta.get("options", {}))
     obs = env.reset(seed=1)
     for _ in range(100):
         obs, *_ = env.step(policy(obs))

@@ -23,7 +23,7 @@ from marathon_rl.ray import Workers, register, train
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "python"
 # 4096 steps per rollout
-SMALL: dict[str, Any] = {"agents": 64, "seed": 3, "threads": 1, "steps": 5 * 4096}
+SMALL: dict[str, Any] = {"num_envs": 64, "seed": 3, "threads": 1, "steps": 5 * 4096}
 
 # Ray and RLlib warn of their own ways
 pytestmark = pytest.mark.filterwarnings("ignore")

@@ -10,7 +10,7 @@ import marathon_rl
 from marathon_rl import Clip, Model, VecEnv, evaluate, load_policy, spec, train
 
 WALK = Path(__file__).parents[2] / "assets" / "motions" / "marathon_man" / "walk.motion"
-SMALL = {"agents": 16, "seed": 5, "steps": 512, "threads": 1}
+SMALL = {"num_envs": 16, "seed": 5, "steps": 512, "threads": 1}
 
 
 @pytest.fixture
@@ -31,8 +31,8 @@ def test_an_environment_follows_a_file(mine: Path) -> None:
 
 
 def test_a_policy_plays_the_task_it_was_trained_for(mine: Path, tmp_path: Path) -> None:
-    result = train("MarathonMan-v0", options={"clip": mine, "future": 1}, out=tmp_path / "run", **SMALL)
-    shipped = train("MarathonMan-v0", options={"clip": "walk", "future": 1}, **SMALL)
+    result = train("MarathonMan-v0", clip=mine, future=1, out=tmp_path / "run", **SMALL)
+    shipped = train("MarathonMan-v0", clip="walk", future=1, **SMALL)
     mine.unlink()
     assert result.summary["options"]["clip"] == "mine.motion"
     policy = load_policy(tmp_path / "run")
@@ -49,7 +49,7 @@ def test_a_policy_plays_the_task_it_was_trained_for(mine: Path, tmp_path: Path) 
 
 
 def test_a_clip_is_a_value(tmp_path: Path) -> None:
-    model = Model.load(WALK.parents[2] / "agents" / "marathon_man.xml")
+    model = Model.from_xml_path(WALK.parents[2] / "agents" / "marathon_man.xml")
     shipped = Clip.load(WALK)
     mine = Clip(model, shipped.qpos, shipped.dt, name="mine", cycle=shipped.cycle)
     assert (mine.name, mine.duration) == ("mine.motion", shipped.duration)
@@ -70,13 +70,13 @@ def test_a_clip_is_a_value(tmp_path: Path) -> None:
     assert [clip if isinstance(clip, str) else clip.name for clip in both] == ["mine.motion", "kick", "mine-2.motion"]
     again = pickle.loads(pickle.dumps(envs[1]))  # noqa: S301
     np.testing.assert_array_equal(again.reset(seed=3), envs[1].reset(seed=3))
-    policy = train("MarathonMan-v0", options={"clip": mine}, **SMALL).policy
+    policy = train("MarathonMan-v0", clip=mine, **SMALL).policy
     mine_again = VecEnv(policy.task, 3, **{**policy.options, "clip": mine})
     np.testing.assert_array_equal(VecEnv(policy.task, 3, **policy.options).reset(seed=2), mine_again.reset(seed=2))
 
 
 def test_wrong_arguments_are_refused_by_name() -> None:
     with pytest.raises(TypeError, match="clip"):
-        train("MarathonMan-v0", options={"clp": "walk"}, **SMALL)
+        train("MarathonMan-v0", clp="walk", **SMALL)
     with pytest.raises(ValueError, match="did you mean 'run'"):
         marathon_rl.spec("MarathonMan-v0", clip="runn")

@@ -19,7 +19,7 @@ from marathon_rl import MarathonEnv, Policy, evaluate, load_policy, train
 
 ROOT = Path(__file__).parents[2]
 # 64 agents make 4096 steps per iteration
-SMALL = {"agents": 64, "seed": 3, "threads": 2}
+SMALL = {"num_envs": 64, "seed": 3, "threads": 2}
 CONFIG = {
     "run": {"agents": 64, "horizon": 64, "total_steps": 8192},
     "network": {"hidden": [16], "activation": "elu"},
@@ -72,7 +72,7 @@ def test_configurations() -> None:
     assert config["ppo"]["epochs"] == 2
     # the preset holds for what is left out
     assert config["ppo"]["action_std"]["min"] == {"from": 0.42, "to": 0.01}
-    result = train("hopper", ROOT / "assets/configs/hopper-fast.yaml", steps=100, agents=16)
+    result = train("hopper", ROOT / "assets/configs/hopper-fast.yaml", steps=100, num_envs=16)
     assert result.policy.meta["hidden"] == [32, 32]
     with pytest.raises(ValueError, match=r"config: ppo\.epoch: unknown key; did you mean 'epochs'"):
         train("hopper", {"ppo": {"epoch": 2}})
@@ -155,14 +155,20 @@ def test_only_false_stops(answer: object) -> None:
 def test_what_is_wrong_is_said() -> None:
     with pytest.raises(ValueError, match="did you mean 'Hopper-v0'"):
         train("hoper")
-    with pytest.raises(ValueError, match="agents is 17, expected a multiple of 16, such as 16"):
-        train("hopper", agents=17)
+    with pytest.raises(ValueError, match="num_envs is 17, expected a multiple of 16, such as 16"):
+        train("hopper", num_envs=17)
     with pytest.raises(ValueError, match="task is missing"):
         train()
     with pytest.raises(ValueError, match="config is for new runs, not for one that resume continues"):
         train("hopper", CONFIG, resume="runs/hopper-1")
     with pytest.raises(ValueError, match="seed is for new runs"):
         train(resume="runs/hopper-1", seed=1)
+    with pytest.raises(ValueError, match="num_envs is for new runs"):
+        train(resume="runs/hopper-1", num_envs=16)
+    with pytest.raises(ValueError, match="stepps is for new runs"):
+        train(resume="runs/hopper-1", stepps=1)
+    with pytest.raises(TypeError, match="unexpected keyword argument 'agents'"):
+        train("hopper", agents=16)
     with pytest.raises(ValueError, match="no such file"):
         load_policy("nowhere.safetensors")
 

@@ -26,14 +26,15 @@ def actions(env: VecEnv, seed: int = 0) -> np.ndarray:
 
 @pytest.mark.parametrize("id", IDS)
 def test_shapes_types_and_rewards(id: str) -> None:
-    env = VecEnv(id, 37, threads=2)
+    env = VecEnv(id, 37, threads=2, autoreset="same_step")
     spec = env.spec
     assert (spec.id, env.num_envs, len(env), env.threads) == (id, 37, 37, 2)
+    assert spec.dtype == ("float64" if id.endswith("-v5") else "float32")
     assert spec.id == marathon_rl.spec(id).id and len(spec.action_names) == spec.act_size
     assert env.reset(seed=3).shape == (37, spec.obs_size)
     for step in range(30):
         obs, reward, terminated, truncated = env.step(actions(env, step))
-        assert obs.shape == (37, spec.obs_size) and obs.dtype == np.float32 and np.isfinite(obs).all()
+        assert obs.shape == (37, spec.obs_size) and obs.dtype == env.dtype == spec.dtype and np.isfinite(obs).all()
         assert reward.shape == terminated.shape == truncated.shape == (37,)
         assert reward.dtype == np.float32 and terminated.dtype == truncated.dtype == np.bool_
         assert env.reward_terms.shape == (37, len(spec.reward_terms))
@@ -190,7 +191,7 @@ def test_other_threads_run_while_it_steps() -> None:
     ("wrong", "message"),
     [
         (lambda: VecEnv("hoper"), "agent 'hoper' does not exist; did you mean 'Hopper-v0'"),
-        (lambda: VecEnv("hopper", 0), "agents is 0, expected at least 1"),
+        (lambda: VecEnv("hopper", 0), "num_envs is 0, expected at least 1"),
         (lambda: VecEnv("hopper", isa="mmx"), "unknown instruction set 'mmx'; expected one of"),
         (lambda: VecEnv("hopper", autoreset="never"), "autoreset is 'never', expected one of"),
         (lambda: VecEnv("hopper", max_episode_steps=0), "max_episode_steps is 0, expected at least 1"),
@@ -297,7 +298,7 @@ def test_agents_can_differ_and_be_pushed() -> None:
     env.vary(strength=strength, gravity=gravity, mask=[False, True, True, True])
     for each in (env, plain):
         each.reset(seed=1)
-    env.push(3, model.body("torso"), (80, 0, 0))
+    env.push(np.tile([80, 0, 0], (4, 1)), body="torso", mask=np.arange(4) == 3)
     snapshot = env.save()
     given = actions(env)
     for _ in range(4):
@@ -308,14 +309,17 @@ def test_agents_can_differ_and_be_pushed() -> None:
     for _ in range(4):
         again = plain.step(given)[0]
     assert np.array_equal(again, obs), "a snapshot holds all of it"
-    before = env.save()
+    before, push = env.save(), np.zeros((4, 3))
     for wrong, message in [
         (lambda: env.vary(mass=np.ones(4)), r"mass has the shape \(4,\), expected \(4, \d+\)"),
         (lambda: env.vary(friction=[1, 1, -1, 1]), "agent 2: friction is -1, expected a factor of 0 or more"),
-        (lambda: env.push(4, 1, (1, 0, 0)), "agent is 4, expected less"),
-        (lambda: env.push(0, 99, (1, 0, 0)), "body is 99, expected less"),
-        (lambda: env.push(-1, 1, (1, 0, 0)), "agent is -1, expected a whole number"),
-        (lambda: env.set_ground(0, 0, [0.0]), "field is 0, but the model has no height fields"),
+        (lambda: env.push((1, 0, 0), body=1), r"force has the shape \(3,\), expected \(4, 3\)"),
+        (lambda: env.push(push, np.zeros((4, 2)), body=1), r"torque has the shape \(4, 2\), expected \(4, 3\)"),
+        (lambda: env.push(push, push + np.nan, body=1), "agent 0: torque is NaN, expected finite numbers"),
+        (lambda: env.push(push, body=99), "body is 99, expected less than 6"),
+        (lambda: env.push(push, body=-1), "body is -1, expected a whole number"),
+        (lambda: env.push(push, body="troso"), "the model has no body 'troso'; did you mean 'torso'"),
+        (lambda: env.set_ground([[0.0]]), "field is 0, but the model has no height fields"),
     ]:
         with pytest.raises(ValueError, match=message):
             wrong()

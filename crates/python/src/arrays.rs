@@ -3,8 +3,8 @@
 use crate::error;
 use marathon_envs::{EnvError, ObsNumber, Spec, StepMut, VecEnv};
 use numpy::{
-    AllowTypeChange, Element, PyArray, PyArray1, PyArray2, PyArrayLike, PyArrayLikeDyn, PyArrayMethods,
-    PyReadonlyArray2, PyReadwriteArray, PyUntypedArrayMethods,
+    AllowTypeChange, Element, PyArray, PyArray1, PyArray2, PyArrayLike, PyArrayMethods, PyReadonlyArray2,
+    PyReadwriteArray, PyUntypedArrayMethods,
     ndarray::{Dimension, Ix1},
 };
 use pyo3::prelude::*;
@@ -228,23 +228,6 @@ where
             }
             Err(error::value(format!("{name} the shape {}, expected {}", tuple(&found), tuple(&expected))))
         }
-    }
-}
-
-/// Elevations of a height field's grid, as a 2D array or one row after another.
-pub fn elevations(value: &Bound<'_, PyAny>, [rows, columns]: [usize; 2]) -> PyResult<Vec<f32>> {
-    let shape: Vec<usize> = value.py().import("numpy")?.call_method1("shape", (value,))?.extract()?;
-    let fits = shape == [rows, columns] || shape == [rows * columns];
-    if !fits {
-        let found = tuple(&shape);
-        let expected = format!("({rows}, {columns}) or ({},)", rows * columns);
-        return Err(error::value(format!("elevations have the shape {found}, expected {expected}")));
-    }
-    let array: PyArrayLikeDyn<'_, f32, AllowTypeChange> = value.extract()?;
-    let elevations: Vec<f32> = array.as_array().iter().copied().collect();
-    match elevations.iter().find(|x| !x.is_finite()) {
-        Some(x) => Err(error::value(format!("elevations have a number that is {x}, expected finite ones"))),
-        None => Ok(elevations),
     }
 }
 

@@ -15,7 +15,10 @@ pub fn env(error: EnvError) -> PyErr {
         EnvError::UnknownOption { name, .. } => {
             PyTypeError::new_err(format!("got an unexpected keyword argument '{name}': {error}"))
         }
-        EnvError::Memory { .. } => PyMemoryError::new_err(error.to_string()),
+        EnvError::Memory { agents, source } => PyMemoryError::new_err(format!("num_envs is {agents}, which {source}")),
+        EnvError::Option { option: "agents", found, expected } => {
+            value(format!("num_envs is {found}, expected {expected}"))
+        }
         _ => PyValueError::new_err(error.to_string()),
     }
 }
@@ -25,6 +28,9 @@ pub fn env(error: EnvError) -> PyErr {
 pub fn learn(error: Error) -> PyErr {
     let text = error.to_string();
     match &error {
+        Error::Config { field, found, expected } if field == "run.agents" => {
+            value(format!("num_envs is {found}, expected {expected}"))
+        }
         Error::Io { source, .. } if source.kind() == ErrorKind::NotFound => PyFileNotFoundError::new_err(text),
         Error::Io { .. } => PyOSError::new_err(text),
         Error::Memory { .. } => PyMemoryError::new_err(text),
@@ -47,7 +53,7 @@ struct Keywords;
 
 impl Spelling for Keywords {
     fn option(&self, name: &str) -> String {
-        name.into()
+        if name == "agents" { "num_envs".into() } else { name.into() }
     }
     fn with_value(&self, name: &str, value: &str) -> String {
         format!("{name}={}", value.replace(',', "_"))

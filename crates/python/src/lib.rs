@@ -8,6 +8,7 @@ mod arrays;
 mod batch_task;
 mod clip;
 mod error;
+mod inputs;
 mod model;
 mod number;
 mod options;

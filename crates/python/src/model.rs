@@ -1,10 +1,11 @@
 //! A compiled model file: what is in it, by name and by index.
 
-use crate::error;
+use crate::{error, number};
 use marathon_physics::hint::among;
 use marathon_physics::model::{Joint, JointType};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::PyString;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -24,14 +25,14 @@ impl Model {
     /// Reads a model file; included files and height fields are looked up beside it.
     #[staticmethod]
     #[pyo3(signature = (path, /))]
-    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+    fn from_xml_path(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         Self::of(py.detach(|| marathon_physics::Model::from_xml_file(path)))
     }
 
     /// Compiles a model given as text, which has no other files; `name` stands for the file in messages.
     #[staticmethod]
     #[pyo3(signature = (xml, /, name = "model"))]
-    fn parse(py: Python<'_>, xml: &str, name: &str) -> PyResult<Self> {
+    fn from_xml_string(py: Python<'_>, xml: &str, name: &str) -> PyResult<Self> {
         Self::of(py.detach(|| marathon_physics::Model::from_xml_str(xml, name)))
     }
 
@@ -268,6 +269,15 @@ impl Model {
 }
 
 impl Model {
+    /// Index of a body that is given by its index or its name.
+    pub(crate) fn body_index(&self, body: &Bound<'_, PyAny>) -> PyResult<usize> {
+        if let Ok(name) = body.cast::<PyString>() {
+            return self.body(name.to_str()?);
+        }
+        let (index, n): (usize, usize) = (number::body(body)?, self.inner.bodies.len());
+        if index < n { Ok(index) } else { Err(error::value(format!("body is {index}, expected less than {n}"))) }
+    }
+
     /// Rows and columns of a height field's grid.
     pub(crate) fn grid(&self, field: usize) -> PyResult<[usize; 2]> {
         let fields = &self.inner.hfields;

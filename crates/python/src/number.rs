@@ -47,7 +47,7 @@ macro_rules! arguments {
     };
 }
 
-arguments!(agent, body, field, seed, max_episode_steps, steps, substeps);
+arguments!(body, field, seed, max_episode_steps, steps, substeps);
 
 /// A number of things, each of which takes memory or time.
 pub trait Count: Sized {
@@ -78,7 +78,7 @@ macro_rules! counts {
     };
 }
 
-counts!(num_envs, threads, agents, episodes, num_agents, width, height);
+counts!(num_envs, threads, episodes, width, height);
 
 /// Seeds of a reset.
 pub enum Seeds {

@@ -119,10 +119,11 @@ pub fn load_policy(py: Python<'_>, path: PathBuf, task: Option<Task>) -> PyResul
 
 /// Plays whole episodes with a policy's best actions. Returns `return_mean`, `return_std`, `return_min`, `return_max`,
 /// `length_mean` (decisions), `distance_mean` (m), `speed_mean` (m/s), `falls`, `diverged` and `episodes`. `task` is needed
-/// for agents that are written in Python; without, it is the policy's own. `options`: arguments of a task with a name; the others
-/// are those that the policy was trained with.
+/// for agents that are written in Python; without, it is the policy's own. `options`: options of the task. Those of a task
+/// with a name that are not given are the ones that the policy was trained with; a class gets them as arguments of its
+/// constructor.
 #[pyfunction]
-#[pyo3(signature = (policy, episodes = 100, *, task = None, seed = EvalOptions::default().seed, threads = 0, options = None))]
+#[pyo3(signature = (policy, episodes = 100, *, task = None, seed = EvalOptions::default().seed, threads = 0, **options))]
 pub fn evaluate<'py>(
     py: Python<'py>,
     policy: &Policy,
@@ -137,7 +138,7 @@ pub fn evaluate<'py>(
     let result = match &task {
         Some(Task::Agent(agent)) => {
             let agents = episodes.clamp(1, MOST_AGENTS).next_multiple_of(BLOCK);
-            let batch_task = task::lockstep(agent.bind(py), agents, threads)?;
+            let batch_task = task::lockstep(agent.bind(py), agents, threads, given)?;
             batch_task::run(py, Some(&batch_task), || play(&batch_task, Isa::best(), &policy.0, &options))?
         }
         other => {

@@ -24,33 +24,33 @@ pub struct Renderer {
 #[pymethods]
 impl Renderer {
     #[new]
-    #[pyo3(signature = (id, width = 480, height = 480, *, agents = 1, **options))]
+    #[pyo3(signature = (id, width = 480, height = 480, *, num_envs = 1, **options))]
     fn new(
         id: &str,
         #[pyo3(from_py_with = number::width)] width: usize,
         #[pyo3(from_py_with = number::height)] height: usize,
-        #[pyo3(from_py_with = number::agents)] agents: usize,
+        #[pyo3(from_py_with = number::num_envs)] num_envs: usize,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let id = task::plain(id);
         let TaskConfig { agent, options } = options::set(id, options)?;
         let agent = registry::global().agent_with(&agent, &options).map_err(error::env)?;
-        Self::with(&agent.model().map_err(error::env)?, width, height, agents)
+        Self::with(&agent.model().map_err(error::env)?, width, height, num_envs)
     }
 
     /// The same for a compiled model.
     #[staticmethod]
-    #[pyo3(signature = (model, width = 480, height = 480, *, agents = 1))]
+    #[pyo3(signature = (model, width = 480, height = 480, *, num_envs = 1))]
     fn of(
         model: &Model,
         #[pyo3(from_py_with = number::width)] width: usize,
         #[pyo3(from_py_with = number::height)] height: usize,
-        #[pyo3(from_py_with = number::agents)] agents: usize,
+        #[pyo3(from_py_with = number::num_envs)] num_envs: usize,
     ) -> PyResult<Self> {
-        Self::with(&model.inner, width, height, agents)
+        Self::with(&model.inner, width, height, num_envs)
     }
 
-    /// Draws agents side by side, their states in the rows of `qpos`, `(agents, nq)`, `elapsed` seconds after the last
+    /// Draws agents side by side, their states in the rows of `qpos`, `(num_envs, nq)`, `elapsed` seconds after the last
     /// picture; the camera jumps to them at first and after more than a second. Returns `(height, width, 3)`, uint8, sRGB.
     #[pyo3(signature = (qpos, elapsed = f64::INFINITY))]
     fn render<'py>(
@@ -69,10 +69,10 @@ impl Renderer {
 }
 
 impl Renderer {
-    fn with(model: &marathon_physics::Model, width: usize, height: usize, agents: usize) -> PyResult<Self> {
+    fn with(model: &marathon_physics::Model, width: usize, height: usize, num_envs: usize) -> PyResult<Self> {
         let scene = Scene::new(model);
         let renderer = marathon_render::Renderer::new(width, height).map_err(error::any)?;
-        let camera = Follow::new(&scene, agents, width, height);
-        Ok(Renderer { scene, renderer, camera, shape: [agents, model.nq] })
+        let camera = Follow::new(&scene, num_envs, width, height);
+        Ok(Renderer { scene, renderer, camera, shape: [num_envs, model.nq] })
     }
 }

@@ -1,12 +1,13 @@
 //! The bare physics of many agents as a Python object: controls in, readings out, no task.
 
-use crate::arrays::{elevations, mask, of_shape, rows};
+use crate::arrays::{mask, of_shape, rows};
+use crate::inputs::{self, Constants, Grounds, grounds_array};
 use crate::model::Model;
 use crate::{error, number};
 use marathon_physics::budget::AGENTS_MEMORY;
-use marathon_physics::{AgentState, Batch, BatchOptions, Isa, Quantity};
+use marathon_physics::{AgentState, Batch, BatchOptions, Isa, Quantity, Variation};
 use numpy::ndarray::Ix2;
-use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods};
 use pyo3::basic::CompareOp;
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
@@ -41,7 +42,7 @@ pub struct Simulation {
     /// Behind a lock because a Python object may be dropped on any thread; never contended.
     batch: Mutex<Batch>,
     model: Py<Model>,
-    num_agents: usize,
+    num_envs: usize,
     threads: usize,
     /// Readings of the present state.
     read: Vec<(Quantity, Py<PyAny>)>,
@@ -50,16 +51,16 @@ pub struct Simulation {
 #[pymethods]
 impl Simulation {
     #[new]
-    #[pyo3(signature = (model, num_agents = 1, *, threads = 0, isa = None))]
+    #[pyo3(signature = (model, num_envs = 1, *, threads = 0, isa = None))]
     fn new(
         py: Python<'_>,
         model: Py<Model>,
-        #[pyo3(from_py_with = number::num_agents)] num_agents: usize,
+        #[pyo3(from_py_with = number::num_envs)] num_envs: usize,
         #[pyo3(from_py_with = number::threads)] threads: usize,
         isa: Option<&str>,
     ) -> PyResult<Self> {
-        if num_agents == 0 {
-            return Err(error::value("num_agents is 0, expected at least 1"));
+        if num_envs == 0 {
+            return Err(error::value("num_envs is 0, expected at least 1"));
         }
         let isa = isa.map(str::parse::<Isa>).transpose().map_err(error::value)?.unwrap_or_else(Isa::best);
         if let Some(obstacle) = isa.obstacle() {
@@ -67,17 +68,17 @@ impl Simulation {
             return Err(error::value(format!("cannot run isa '{found}': {obstacle}; the best is '{best}'")));
         }
         let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
-        let threads = if threads == 0 { cores().min(num_agents.div_ceil(AGENTS_PER_THREAD)) } else { threads };
+        let threads = if threads == 0 { cores().min(num_envs.div_ceil(AGENTS_PER_THREAD)) } else { threads };
         if threads > MOST_THREADS {
             return Err(error::value(format!("threads is {threads}, expected at most {MOST_THREADS}")));
         }
         AGENTS_MEMORY
-            .check(num_agents as f64 * agent_bytes(&model.get().inner))
-            .map_err(|over| PyMemoryError::new_err(format!("num_agents is {num_agents}, which {over}")))?;
-        let options = BatchOptions { agents: num_agents, threads, isa, ..Default::default() };
+            .check(num_envs as f64 * agent_bytes(&model.get().inner))
+            .map_err(|over| PyMemoryError::new_err(format!("num_envs is {num_envs}, which {over}")))?;
+        let options = BatchOptions { agents: num_envs, threads, isa, ..Default::default() };
         let inner = &model.get().inner;
         let batch = py.detach(|| Batch::new(inner, &options)).map_err(|e| error::value(e.to_string()))?;
-        Ok(Simulation { batch: Mutex::new(batch), model, num_agents, threads, read: Vec::new() })
+        Ok(Simulation { batch: Mutex::new(batch), model, num_envs, threads, read: Vec::new() })
     }
 
     /// The model.
@@ -88,8 +89,8 @@ impl Simulation {
 
     /// Number of agents.
     #[getter]
-    fn num_agents(&self) -> usize {
-        self.num_agents
+    fn num_envs(&self) -> usize {
+        self.num_envs
     }
 
     /// Number of threads.
@@ -98,9 +99,9 @@ impl Simulation {
         self.threads
     }
 
-    /// Advances every agent by `substeps` physics steps under `ctrl`, `(num_agents, nu)`.
+    /// Advances every agent by `substeps` physics steps under `ctrl`, `(num_envs, nu)`.
     ///
-    /// Returns which agents broke, `(num_agents,)`: their states stopped being finite, so they were put into the reference
+    /// Returns which agents broke, `(num_envs,)`: their states stopped being finite, so they were put into the reference
     /// configuration at rest.
     #[pyo3(signature = (ctrl, substeps = 1))]
     fn step<'py>(
@@ -112,9 +113,9 @@ impl Simulation {
         if substeps == 0 {
             return Err(error::value("substeps is 0, expected at least 1"));
         }
-        let ctrl = of_shape::<f64, Ix2, 2>("ctrl has", ctrl, [self.num_agents, self.model.get().inner.nu])?;
+        let ctrl = of_shape::<f64, Ix2, 2>("ctrl has", ctrl, [self.num_envs, self.model.get().inner.nu])?;
         self.read.clear();
-        let (ctrl, n) = (rows(&ctrl), self.num_agents);
+        let (ctrl, n) = (rows(&ctrl), self.num_envs);
         let batch = self.batch();
         let broken = py.detach(|| batch.step(&ctrl, substeps));
         let mut out = vec![false; n];
@@ -124,8 +125,8 @@ impl Simulation {
         Ok(PyArray1::from_vec(py, out))
     }
 
-    /// Puts agents, all or those of a mask, `(num_agents,)`, into the states in the rows of `qpos`, `(num_agents, nq)`, and
-    /// `qvel`, `(num_agents, nv)`. Quaternions are normalized; controls, pushes and contacts are forgotten.
+    /// Puts agents, all or those of a mask, `(num_envs,)`, into the states in the rows of `qpos`, `(num_envs, nq)`, and
+    /// `qvel`, `(num_envs, nv)`. Quaternions are normalized; controls, pushes and contacts are forgotten.
     #[pyo3(signature = (qpos, qvel, mask = None))]
     fn reset(
         &mut self,
@@ -133,10 +134,10 @@ impl Simulation {
         qvel: &Bound<'_, PyAny>,
         mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let mask = self::mask(mask, self.num_agents)?;
+        let mask = self::mask(mask, self.num_envs)?;
         let model = &self.model.get().inner;
-        let qpos = of_shape::<f64, Ix2, 2>("qpos has", qpos, [self.num_agents, model.nq])?;
-        let qvel = of_shape::<f64, Ix2, 2>("qvel has", qvel, [self.num_agents, model.nv])?;
+        let qpos = of_shape::<f64, Ix2, 2>("qpos has", qpos, [self.num_envs, model.nq])?;
+        let qvel = of_shape::<f64, Ix2, 2>("qvel has", qvel, [self.num_envs, model.nv])?;
         let (qpos, qvel) = (qpos.as_array(), qvel.as_array());
         let chosen = || (0..mask.len()).filter(|i| mask[*i]);
         if let Some(i) = chosen().find(|i| !qpos.row(*i).iter().chain(qvel.row(*i)).all(|x| x.is_finite())) {
@@ -149,47 +150,79 @@ impl Simulation {
         Ok(())
     }
 
-    /// Pushes a body of an agent until told otherwise or reset: force, N, and torque, N m, in world axes at the body's
-    /// center of mass.
-    #[pyo3(signature = (agent, body, force, torque = [0.0; 3]))]
+    /// Pushes a body, given by its index or name, of all agents or those of a mask: force, N, and torque, N m,
+    /// `(num_envs, 3)`, in world axes at the body's center of mass. It lasts until changed or until a reset.
+    #[pyo3(signature = (force, torque = None, *, body, mask = None))]
     fn push(
         &mut self,
-        #[pyo3(from_py_with = number::agent)] agent: usize,
-        #[pyo3(from_py_with = number::body)] body: usize,
-        force: [f64; 3],
-        torque: [f64; 3],
+        force: &Bound<'_, PyAny>,
+        torque: Option<&Bound<'_, PyAny>>,
+        body: &Bound<'_, PyAny>,
+        mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let bodies = self.model.get().inner.bodies.len();
-        for (what, found, n) in [("agent", agent, self.num_agents), ("body", body, bodies)] {
-            if found >= n {
-                return Err(error::value(format!("{what} is {found}, expected less than {n}")));
-            }
-        }
+        let pushes = inputs::pushes(self.model.get(), self.num_envs, force, torque, body, mask)?;
         self.read.clear();
-        self.batch().push(agent, body, force, torque);
+        for (agent, force, torque) in pushes.each {
+            self.batch().push(agent, pushes.body, force, torque);
+        }
         Ok(())
     }
 
-    /// Sets an agent's own ground: elevations, m above the zero of the model's height field `field`. They are `(nrow,
-    /// ncol)`, or row after row; the first row has the smallest y. The ground lasts over resets, until changed, and
-    /// belongs to snapshots.
+    /// Sets constants of all agents or those of a mask: factors of the bodies' masses and inertias, `(num_envs,
+    /// nbody)`, of all friction coefficients, `(num_envs,)`, and of the actuators' forces, `(num_envs, nu)`; gravity,
+    /// m/s^2, `(num_envs, 3)`. Omitted constants have the model's values. They last over resets, until changed.
+    #[pyo3(signature = (*, mass = None, friction = None, strength = None, gravity = None, mask = None))]
+    fn vary(
+        &mut self,
+        mass: Option<&Bound<'_, PyAny>>,
+        friction: Option<&Bound<'_, PyAny>>,
+        strength: Option<&Bound<'_, PyAny>>,
+        gravity: Option<&Bound<'_, PyAny>>,
+        mask: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let none = Variation::none(&self.model.get().inner);
+        let each = Constants { mass, friction, strength, gravity, mask }.read(&none, self.num_envs)?;
+        self.read.clear();
+        for (agent, own) in each {
+            self.batch().vary(agent, &own);
+        }
+        Ok(())
+    }
+
+    /// Ground of each agent: elevations, m above the zero of the model's height field `field`, `(num_envs, nrow, ncol)`,
+    /// a new array. The first row has the smallest y.
+    #[pyo3(signature = (field = 0))]
+    fn ground<'py>(
+        &mut self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = number::field)] field: usize,
+    ) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        let (n, grid) = (self.num_envs, self.model.get().grid(field)?);
+        let batch = self.batch();
+        let elevations = (0..n).flat_map(|agent| batch.ground(agent, field)).collect();
+        grounds_array(py, n, grid, elevations)
+    }
+
+    /// Sets the ground of all agents or those of a mask: elevations, m above the zero of the model's height field `field`,
+    /// `(num_envs, nrow, ncol)`, or `(nrow, ncol)` for the same ground. The first row has the smallest y. The ground lasts
+    /// over resets, until changed, and belongs to snapshots.
+    #[pyo3(signature = (elevations, field = 0, mask = None))]
     fn set_ground(
         &mut self,
-        #[pyo3(from_py_with = number::agent)] agent: usize,
-        #[pyo3(from_py_with = number::field)] field: usize,
         elevations: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = number::field)] field: usize,
+        mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        if agent >= self.num_agents {
-            return Err(error::value(format!("agent is {agent}, expected less than {}", self.num_agents)));
-        }
-        let elevations = self::elevations(elevations, self.model.get().grid(field)?)?;
+        let grounds = Grounds::read(self.model.get().grid(field)?, self.num_envs, elevations, mask)?;
         self.read.clear();
-        self.batch().set_ground(agent, field, &elevations);
+        for (agent, elevations) in grounds.each() {
+            self.batch().set_ground(agent, field, elevations);
+        }
         Ok(())
     }
 
-    /// Heights of the ground at places of the world, m, `(num_agents, n)`: of planes and of height fields that lie level,
-    /// with ground of each agent's own. `x` and `y`, m, are `(num_agents, n)`. Beyond all ground, the height is that of the
+    /// Heights of the ground at places of the world, m, `(num_envs, n)`: of planes and of height fields that lie level,
+    /// with ground of each agent's own. `x` and `y`, m, are `(num_envs, n)`. Beyond all ground, the height is that of the
     /// nearest place; 0 if the model has no ground.
     fn ground_height<'py>(
         &mut self,
@@ -199,10 +232,10 @@ impl Simulation {
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let shape: Vec<usize> = py.import("numpy")?.call_method1("shape", (x,))?.extract()?;
         let n = if shape.len() == 2 { shape[1] } else { 1 };
-        let x = of_shape::<f64, Ix2, 2>("x has", x, [self.num_agents, n])?;
-        let y = of_shape::<f64, Ix2, 2>("y has", y, [self.num_agents, n])?;
+        let x = of_shape::<f64, Ix2, 2>("x has", x, [self.num_envs, n])?;
+        let y = of_shape::<f64, Ix2, 2>("y has", y, [self.num_envs, n])?;
         let places: Vec<[f64; 2]> = rows(&x).iter().zip(rows(&y).iter()).map(|(x, y)| [*x, *y]).collect();
-        let heights = PyArray2::<f64>::zeros(py, [self.num_agents, n], false);
+        let heights = PyArray2::<f64>::zeros(py, [self.num_envs, n], false);
         let mut writer = heights.try_readwrite().map_err(|e| error::array("heights", e))?;
         let (rows, batch) = (writer.as_slice_mut()?, self.batch());
         py.detach(|| batch.ground_height(&places, rows));
@@ -212,7 +245,7 @@ impl Simulation {
 
     /// Everything that the future depends on, as JSON. Loaded, the simulation continues with the same bits.
     fn save<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let n = self.num_agents;
+        let n = self.num_envs;
         let batch = self.batch();
         let json = py.detach(move || {
             let states: Vec<AgentState> = (0..n).map(|i| batch.agent_state(i)).collect();
@@ -225,8 +258,8 @@ impl Simulation {
     fn load(&mut self, snapshot: &[u8]) -> PyResult<()> {
         let states: Vec<AgentState> =
             serde_json::from_slice(snapshot).map_err(|e| error::value(format!("snapshot: {e}")))?;
-        if states.len() != self.num_agents {
-            let (found, expected) = (states.len(), self.num_agents);
+        if states.len() != self.num_envs {
+            let (found, expected) = (states.len(), self.num_envs);
             return Err(error::value(format!("the snapshot has {found} agents, expected {expected}")));
         }
         if let Some(i) = states.iter().position(|state| !state.fits(&self.model.get().inner)) {
@@ -242,73 +275,73 @@ impl Simulation {
         Ok(())
     }
 
-    /// Configuration, `(num_agents, nq)`.
+    /// Configuration, `(num_envs, nq)`.
     #[getter]
     fn qpos(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.reading(py, Quantity::Qpos)
     }
 
-    /// Velocity, `(num_agents, nv)`.
+    /// Velocity, `(num_envs, nv)`.
     #[getter]
     fn qvel(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.reading(py, Quantity::Qvel)
     }
 
-    /// Origins of the bodies' frames, m, `(num_agents, nbody, 3)`.
+    /// Origins of the bodies' frames, m, `(num_envs, nbody, 3)`.
     #[getter]
     fn body_pos(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.reading(py, Quantity::BodyPos)
     }
 
-    /// Directions of the bodies' x, y and z axes, `(num_agents, nbody, 3, 3)`: `[..., 0, :]` is that of x.
+    /// Directions of the bodies' x, y and z axes, `(num_envs, nbody, 3, 3)`: `[..., 0, :]` is that of x.
     #[getter]
     fn body_axes(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.reading(py, Quantity::BodyAxes)
     }
 
-    /// Velocities of the origins of the bodies' frames, m/s, `(num_agents, nbody, 3)`.
+    /// Velocities of the origins of the bodies' frames, m/s, `(num_envs, nbody, 3)`.
     #[getter]
     fn body_velocity(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.reading(py, Quantity::BodyVelocity)
     }
 
-    /// Angular velocities of the bodies, rad/s, `(num_agents, nbody, 3)`.
+    /// Angular velocities of the bodies, rad/s, `(num_envs, nbody, 3)`.
     #[getter]
     fn body_angular_velocity(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.reading(py, Quantity::BodyAngularVelocity)
     }
 
-    /// Centers of the geoms, m, `(num_agents, ngeom, 3)`.
+    /// Centers of the geoms, m, `(num_envs, ngeom, 3)`.
     #[getter]
     fn geom_pos(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.reading(py, Quantity::GeomPos)
     }
 
-    /// Velocities of the geoms' centers, m/s, `(num_agents, ngeom, 3)`.
+    /// Velocities of the geoms' centers, m/s, `(num_envs, ngeom, 3)`.
     #[getter]
     fn geom_velocity(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.reading(py, Quantity::GeomVelocity)
     }
 
-    /// Geoms that touched the static world at the last physics step, `(num_agents, ngeom)`, bool.
+    /// Geoms that touched the static world at the last physics step, `(num_envs, ngeom)`, bool.
     #[getter]
     fn touching(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.reading(py, Quantity::Touching)
     }
 
-    /// Geoms that touched the static world at any physics step of the last `step`, `(num_agents, ngeom)`, bool.
+    /// Geoms that touched the static world at any physics step of the last `step`, `(num_envs, ngeom)`, bool.
     #[getter]
     fn touched(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.reading(py, Quantity::Touched)
     }
 
-    /// Normal forces of the geoms' contacts with the static world at the last physics step, N, `(num_agents, ngeom)`.
+    /// Normal forces of the geoms' contacts with the static world at the last physics step, N, `(num_envs, ngeom)`.
     #[getter]
     fn normal_force(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
         self.reading(py, Quantity::NormalForce)
     }
 
-    /// Sensors' values at the present state and controls, in the model's order, `(num_agents, ...)`; NaN for those that
+    /// Sensors' values at the present state and controls, in the model's order, `(num_envs, ...)`; NaN for those that
     /// cannot be evaluated. This costs about as much as a physics step.
     #[getter]
     fn sensors(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
@@ -316,11 +349,11 @@ impl Simulation {
     }
 
     fn __len__(&self) -> usize {
-        self.num_agents
+        self.num_envs
     }
 
     fn __repr__(&self) -> String {
-        format!("Simulation({:?}, num_agents={})", self.model.get().inner.name, self.num_agents)
+        format!("Simulation({:?}, num_envs={})", self.model.get().inner.name, self.num_envs)
     }
 }
 
@@ -369,7 +402,7 @@ impl Simulation {
 
     fn shape(&self, quantity: Quantity) -> Vec<usize> {
         let model = &self.model.get().inner;
-        let (n, bodies, geoms) = (self.num_agents, model.bodies.len(), model.geoms.len());
+        let (n, bodies, geoms) = (self.num_envs, model.bodies.len(), model.geoms.len());
         match quantity {
             Quantity::BodyPos | Quantity::BodyVelocity | Quantity::BodyAngularVelocity => vec![n, bodies, 3],
             Quantity::BodyAxes => vec![n, bodies, 3, 3],

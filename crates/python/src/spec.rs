@@ -109,6 +109,13 @@ impl Spec {
         options::show(py, &self.options)
     }
 
+    /// Type of the observations, unless an environment is made with another: "float64" for Gymnasium's own tasks, as
+    /// there, and "float32" for all others.
+    #[getter]
+    fn dtype(&self) -> &'static str {
+        if self.is_double() { "float64" } else { "float32" }
+    }
+
     /// Parts of the observation by name, in their order: `obs[:, spec.observations["touch"]]`.
     #[getter]
     fn observations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
@@ -170,6 +177,11 @@ impl CommandRange {
 }
 
 impl Spec {
+    /// Whether observations are float64: those of Gymnasium's own tasks, which alone have these versions.
+    pub fn is_double(&self) -> bool {
+        self.id.ends_with("-v4") || self.id.ends_with("-v5")
+    }
+
     /// From the facts that an environment goes by.
     pub fn of(spec: &marathon_envs::Spec) -> PyResult<Self> {
         let agent = registry::global().agent_with(&spec.id, &spec.options).map_err(error::env)?;

@@ -15,7 +15,7 @@ pub enum Task {
     /// One of the registry.
     #[pyo3(transparent)]
     Name(String),
-    /// A `MarathonAgent`, class or object.
+    /// A `MarathonAgent`, class or object. An object stands for its class.
     #[pyo3(transparent)]
     Agent(Py<PyAny>),
 }
@@ -41,15 +41,17 @@ impl Task {
     pub fn spec(&self, py: Python<'_>) -> PyResult<Spec> {
         match self {
             Task::Name(name) => Ok(registry::factory(plain(name), Isa::best()).map_err(error::env)?.spec().clone()),
-            Task::Agent(agent) => batch_task::spec(&vec_env(agent.bind(py), 1, 1)?),
+            Task::Agent(agent) => batch_task::spec(&vec_env(agent.bind(py), 1, 1, None)?),
         }
     }
 
-    /// The task of a run; `made` learns of a batch task that is made for it.
+    /// The task of a run; `made` learns of a batch task that is made for it. An agent that is written in Python takes the
+    /// options as arguments of its constructor.
     pub fn of_run<'a>(
         &'a self,
         py: Python<'a>,
         threads: usize,
+        options: Option<&'a Bound<'a, PyDict>>,
         made: &'a mut Made,
     ) -> PyResult<marathon_runs::Task<'a>> {
         let agent = match self {
@@ -59,7 +61,7 @@ impl Task {
         check(agent)?;
         let id: String = agent.call_method0("task_id")?.extract()?;
         let text = id.clone();
-        Ok(marathon_runs::Task::made(id, move |agents| match lockstep(agent, agents, threads) {
+        Ok(marathon_runs::Task::made(id, move |agents| match lockstep(agent, agents, threads, options) {
             Ok(batch_task) => {
                 let batch_task = Arc::new(batch_task);
                 made.batch_task = Some(batch_task.clone());
@@ -74,16 +76,29 @@ impl Task {
 }
 
 /// So many agents of a kind, for the trainer.
-pub fn lockstep(agent: &Bound<'_, PyAny>, agents: usize, threads: usize) -> PyResult<BatchAdapter> {
-    batch_task::lockstep(&vec_env(agent, agents, threads)?)
+pub fn lockstep(
+    agent: &Bound<'_, PyAny>,
+    agents: usize,
+    threads: usize,
+    options: Option<&Bound<'_, PyDict>>,
+) -> PyResult<BatchAdapter> {
+    batch_task::lockstep(&vec_env(agent, agents, threads, options)?)
 }
 
-fn vec_env<'py>(agent: &Bound<'py, PyAny>, agents: usize, threads: usize) -> PyResult<Bound<'py, PyAny>> {
+fn vec_env<'py>(
+    agent: &Bound<'py, PyAny>,
+    agents: usize,
+    threads: usize,
+    options: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Bound<'py, PyAny>> {
     check(agent)?;
-    let options = PyDict::new(agent.py());
-    options.set_item("threads", threads)?;
-    options.set_item("autoreset", "same_step")?;
-    agent.call_method("vec_env", (agents,), Some(&options))
+    let keywords = PyDict::new(agent.py());
+    keywords.set_item("threads", threads)?;
+    keywords.set_item("autoreset", "same_step")?;
+    if let Some(options) = options {
+        keywords.update(options.as_mapping())?;
+    }
+    agent.call_method("vec_env", (agents,), Some(&keywords))
 }
 
 fn check(agent: &Bound<'_, PyAny>) -> PyResult<()> {
@@ -91,9 +106,7 @@ fn check(agent: &Bound<'_, PyAny>) -> PyResult<()> {
         true => Ok(()),
         false => {
             let found = agent.get_type().name()?;
-            Err(PyTypeError::new_err(format!(
-                "task is of type {found}, expected a task's name or a MarathonAgent class"
-            )))
+            Err(PyTypeError::new_err(format!("task is of type {found}, expected a task's name or a MarathonAgent")))
         }
     }
 }

@@ -4,6 +4,7 @@ use crate::players::PyPlayers;
 use crate::policy::{Policy, json};
 use crate::task::{self, Made, Task};
 use crate::{batch_task, error, number, options as arguments};
+use marathon_envs::Options;
 use marathon_learn::{Control, Players};
 use marathon_runs::report::csv::columns;
 use marathon_runs::{LearnOptions, RunError, RunOptions, Session};
@@ -73,21 +74,22 @@ impl TrainResult {
 
 /// Trains a policy with the native trainer, without the GIL, and evaluates it.
 ///
-/// `task`: its name, or a `MarathonAgent` class. `config`: a file, or a dictionary with the same keys, such as
-/// `{"ppo": {"lr": 3e-4}}`; the task's preset holds for what it leaves out. `seed`, `steps` (of all agents together), `agents` (a multiple of
-/// 16) and `threads` change it. `callback`: called after every iteration with a dictionary of the numbers that `progress.csv`
-/// holds; if it returns False, training stops. `out`: a new folder for everything that the command `marathon train` writes;
-/// without, nothing is written. `resume`: the folder of a run to go on with, in place of a configuration; the task is needed
-/// for a class alone. `options`: arguments of a task with a name.
-/// `initialize_from`: a policy to start from in place of random weights, a file or the folder of a run, whose hidden layers are
-/// no wider; it may observe less. `players`: an object that has the rollouts played elsewhere, as `marathon_rl.ray.Workers` does.
+/// `task`: its name, or a `MarathonAgent` class or object, which stands for its class. `config`: a file, or a dictionary with
+/// the same keys, such as `{"ppo": {"lr": 3e-4}}`; the task's preset holds for what it leaves out. `seed`, `steps` (of all
+/// agents together), `num_envs` (a multiple of 16) and `threads` change it. `callback`: called after every iteration with a
+/// dictionary of the numbers that `progress.csv` holds; if it returns False, training stops. `out`: a new folder for everything
+/// that the command `marathon train` writes; without, nothing is written. `resume`: the folder of a run to continue, in place
+/// of a configuration; the task is needed for a class alone. `initialize_from`: a policy to start from in place of random
+/// weights, a file or the folder of a run, whose hidden layers are no wider; it may observe less. `players`: an object that has
+/// the rollouts played elsewhere, as `marathon_rl.ray.Workers` does. `options`: options of the task; a class gets them as
+/// arguments of its constructor.
 ///
 /// Ctrl-C and exceptions of the callback end training after the iteration; with a folder, what was learned is there and
 /// `resume` goes on with it. The same seed gives the same policy, bit for bit, for any number of threads.
 #[pyfunction]
 #[pyo3(signature = (
-    task = None, config = None, *, callback = None, seed = None, steps = None, agents = None, threads = None, out = None,
-    resume = None, players = None, options = None, initialize_from = None
+    task = None, config = None, *, callback = None, seed = None, steps = None, num_envs = None, threads = None,
+    out = None, resume = None, players = None, initialize_from = None, **options
 ))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python function")]
 pub fn train(
@@ -97,30 +99,39 @@ pub fn train(
     callback: Option<Py<PyAny>>,
     #[pyo3(from_py_with = number::seed)] seed: Option<u64>,
     #[pyo3(from_py_with = number::steps)] steps: Option<u64>,
-    #[pyo3(from_py_with = number::agents)] agents: Option<usize>,
+    #[pyo3(from_py_with = number::num_envs)] num_envs: Option<usize>,
     #[pyo3(from_py_with = number::threads)] threads: Option<usize>,
     out: Option<PathBuf>,
     resume: Option<PathBuf>,
     players: Option<Py<PyAny>>,
-    options: Option<&Bound<'_, PyDict>>,
     initialize_from: Option<PathBuf>,
+    options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<TrainResult> {
     // one function: the keywords of Python in order
+    let given = options;
     let of_task = match &task {
-        Some(Task::Name(name)) => arguments::read(task::plain(name), options)?,
-        _ => arguments::read("", options)?,
+        _ if resume.is_some() && !matches!(task, Some(Task::Agent(_))) => {
+            // a run keeps its options; a keyword may be misspelled, so the message names it
+            if let Some((name, _)) = given.and_then(|given| given.iter().next()) {
+                return Err(error::value(format!("{name} is for new runs, not for one that resume continues")));
+            }
+            Options::new()
+        }
+        Some(Task::Name(name)) => arguments::read(task::plain(name), given)?,
+        // a class takes them itself
+        _ => Options::new(),
     };
     let mut options = RunOptions {
         learn: LearnOptions { steps, seed, threads, ..Default::default() },
         task: of_task.into(),
-        agents,
+        agents: num_envs,
         processes: 0,
         out,
         resume,
         initialize_from,
     };
     let mut made = Made::default();
-    let task = task.as_ref().map(|task| task.of_run(py, threads.unwrap_or(0), &mut made)).transpose()?;
+    let task = task.as_ref().map(|task| task.of_run(py, threads.unwrap_or(0), given, &mut made)).transpose()?;
     let mut loaded = None;
     match config {
         None => {}

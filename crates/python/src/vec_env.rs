@@ -1,14 +1,15 @@
 //! Many agents of one kind as a Python object.
 
-use crate::arrays::{Arrays, ObsMut, elevations, mask, of_shape, rows};
+use crate::arrays::{Arrays, ObsMut, mask, of_shape, rows};
+use crate::inputs::{self, Constants, Grounds, grounds_array};
 use crate::model::Model;
 use crate::number::{self, Seeds};
 use crate::spec::Spec;
 use crate::{error, options, task};
 use marathon_envs::{AgentState, Autoreset, Options, VecEnvOptions, registry};
 use marathon_physics::lanes::Isa;
-use numpy::ndarray::{Ix1, Ix2};
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use numpy::ndarray::Ix2;
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::sync::{Arc, Mutex};
@@ -24,7 +25,7 @@ type StepResult = (Py<PyAny>, Py<PyArray1<f32>>, Py<PyArray1<bool>>, Py<PyArray1
 ///
 /// Arrays are row-major with one row per agent. Without `copy`, the environment owns the arrays that it returns and
 /// overwrites them at the next step; with `copy`, every step returns new ones. Observations are computed in
-/// 32 bits, and written in 64 if `dtype` says so.
+/// 32 bits, and written in 64 if `dtype` says so, or without it if the task is one of Gymnasium's.
 #[pyclass(module = "marathon_rl")]
 pub struct VecEnv {
     /// Behind a lock because a Python object may be dropped on any thread; never contended.
@@ -50,8 +51,8 @@ struct Made {
 impl VecEnv {
     #[new]
     #[pyo3(signature = (
-        id, num_envs = 1, *, seed = 0, threads = 0, isa = None, autoreset = "same_step", max_episode_steps = None,
-        copy = false, dtype = "float32", **options
+        id, num_envs = 1, *, seed = 0, threads = 0, isa = None, autoreset = "next_step", max_episode_steps = None,
+        copy = false, dtype = None, **options
     ))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python constructor")]
     fn new(
@@ -64,20 +65,21 @@ impl VecEnv {
         autoreset: &str,
         #[pyo3(from_py_with = number::max_episode_steps)] max_episode_steps: Option<usize>,
         copy: bool,
-        dtype: &str,
+        dtype: Option<&str>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let isa = isa.map(str::parse::<Isa>).transpose().map_err(error::value)?;
         let autoreset = parse_autoreset(autoreset)?;
-        let double = parse_dtype(dtype)?;
+        let dtype = dtype.map(parse_dtype).transpose()?;
         let (agents, made) = (num_envs, Made { seed, threads, isa });
         let id = task::plain(id);
         let setting = options::set(id, options)?;
         let options = Options::new();
         let options = VecEnvOptions { agents, seed, threads, isa, autoreset, max_episode_steps, options };
         let env = py.detach(|| setting.vec_env(&options)).map_err(error::run)?;
-        let arrays = Arrays::new(py, num_envs, env.spec(), double);
-        let spec = Py::new(py, Spec::of(env.spec())?)?;
+        let spec = Spec::of(env.spec())?;
+        let arrays = Arrays::new(py, num_envs, env.spec(), dtype.unwrap_or(spec.is_double()));
+        let spec = Py::new(py, spec)?;
         Ok(VecEnv { env: Mutex::new(env), arrays, spec, num_envs, autoreset, copy, ready: false, made, model: None })
     }
 
@@ -297,37 +299,9 @@ impl VecEnv {
         gravity: Option<&Bound<'_, PyAny>>,
         mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let (n, mask) = (self.num_envs, self::mask(mask, self.num_envs)?);
         let none = self.env().unvaried().clone();
-        let table = |name: &str, given: Option<&Bound<'_, PyAny>>, columns: usize| -> PyResult<Option<Vec<f64>>> {
-            let Some(given) = given else { return Ok(None) };
-            let given = of_shape::<f64, Ix2, 2>(&format!("{name} has"), given, [n, columns])?;
-            Ok(Some(rows(&given).into_owned()))
-        };
-        let mass = table("mass", mass, none.mass.len())?;
-        let strength = table("strength", strength, none.strength.len())?;
-        let gravity = table("gravity", gravity, 3)?;
-        let friction = match friction {
-            Some(given) => Some(of_shape::<f64, Ix1, 1>("friction has", given, [n])?.as_array().to_vec()),
-            None => None,
-        };
-        let before = self.env().save();
-        for agent in (0..n).filter(|i| mask[*i]) {
-            let mut own = none.clone();
-            let parts = [(&mass, &mut own.mass[..]), (&strength, &mut own.strength), (&gravity, &mut own.gravity)];
-            for (given, to) in parts {
-                if let Some(given) = given {
-                    to.copy_from_slice(&given[agent * to.len()..][..to.len()]);
-                }
-            }
-            if let Some(friction) = &friction {
-                own.friction = friction[agent];
-            }
-            if let Err(error) = self.env().vary(agent, &own) {
-                // all or nothing
-                self.env().load(&before).map_err(error::env)?;
-                return Err(error::value(format!("agent {agent}: {error}")));
-            }
+        for (agent, own) in (Constants { mass, friction, strength, gravity, mask }).read(&none, self.num_envs)? {
+            self.env().vary(agent, &own).map_err(error::env)?;
         }
         Ok(())
     }
@@ -374,44 +348,59 @@ impl VecEnv {
         Ok(())
     }
 
-    /// Pushes a body of an agent until told otherwise or until its next episode: force, N, and torque, N m, in world axes at
-    /// the body's center of mass. Bodies are those of `model`.
-    #[pyo3(signature = (agent, body, force, torque = [0.0; 3]))]
+    /// Pushes a body, given by its index or name, of all agents or those of a mask: force, N, and torque, N m,
+    /// `(num_envs, 3)`, in world axes at the body's center of mass. It lasts until changed or until the agent's next
+    /// episode.
+    #[pyo3(signature = (force, torque = None, *, body, mask = None))]
     fn push(
         &mut self,
-        #[pyo3(from_py_with = number::agent)] agent: usize,
-        #[pyo3(from_py_with = number::body)] body: usize,
-        force: [f64; 3],
-        torque: [f64; 3],
+        py: Python<'_>,
+        force: &Bound<'_, PyAny>,
+        torque: Option<&Bound<'_, PyAny>>,
+        body: &Bound<'_, PyAny>,
+        mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        self.env().push(agent, body, force, torque).map_err(error::env)
+        let model = self.model(py)?;
+        let pushes = inputs::pushes(model.get(), self.num_envs, force, torque, body, mask)?;
+        for (agent, force, torque) in pushes.each {
+            self.env().push(agent, pushes.body, force, torque).map_err(error::env)?;
+        }
+        Ok(())
     }
 
-    /// An agent's ground: elevations, m above the zero of the model's height field `field`, `(nrow, ncol)`, a new
-    /// array. The first row has the smallest y.
-    #[pyo3(signature = (agent, field = 0))]
+    /// Ground of each agent: elevations, m above the zero of the model's height field `field`, `(num_envs, nrow, ncol)`,
+    /// a new array. The first row has the smallest y.
+    #[pyo3(signature = (field = 0))]
     fn ground<'py>(
         &mut self,
         py: Python<'py>,
-        #[pyo3(from_py_with = number::agent)] agent: usize,
         #[pyo3(from_py_with = number::field)] field: usize,
-    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let ground = self.env().ground(agent, field).map_err(error::env)?;
-        PyArray1::from_vec(py, ground).reshape(self.grid(py, field)?)
+    ) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        let (n, grid) = (self.num_envs, self.grid(py, field)?);
+        let mut elevations = Vec::with_capacity(n * grid[0] * grid[1]);
+        for agent in 0..n {
+            elevations.extend(self.env().ground(agent, field).map_err(error::env)?);
+        }
+        grounds_array(py, n, grid, elevations)
     }
 
-    /// Sets an agent's own ground: elevations, m above the zero of the model's height field `field`. They are `(nrow,
-    /// ncol)`, or row after row; the first row has the smallest y. The ground lasts over resets, until changed. In
-    /// tasks that draw the ground of every episode, such as `TerrainWalker2d-v0`, it lasts until the episode ends.
+    /// Sets the ground of all agents or those of a mask: elevations, m above the zero of the model's height field `field`,
+    /// `(num_envs, nrow, ncol)`, or `(nrow, ncol)` for the same ground. The first row has the smallest y. The ground lasts
+    /// over resets, until changed. In tasks that draw the ground of every episode, such as `TerrainWalker2d-v0`, it lasts
+    /// until the episode ends.
+    #[pyo3(signature = (elevations, field = 0, mask = None))]
     fn set_ground(
         &mut self,
         py: Python<'_>,
-        #[pyo3(from_py_with = number::agent)] agent: usize,
-        #[pyo3(from_py_with = number::field)] field: usize,
         elevations: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = number::field)] field: usize,
+        mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let elevations = self::elevations(elevations, self.grid(py, field)?)?;
-        self.env().set_ground(agent, field, &elevations).map_err(error::env)
+        let grounds = Grounds::read(self.grid(py, field)?, self.num_envs, elevations, mask)?;
+        for (agent, elevations) in grounds.each() {
+            self.env().set_ground(agent, field, elevations).map_err(error::env)?;
+        }
+        Ok(())
     }
 
     /// Everything that the future depends on. Loaded, the environment continues with the same bits, whatever the number

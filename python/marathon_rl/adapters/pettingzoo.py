@@ -23,7 +23,7 @@ class MarathonParallelEnv(ParallelEnv[str, FloatArray, FloatArray]):
     def __init__(
         self,
         task: Task,
-        num_agents: int = 2,
+        num_envs: int = 2,
         *,
         render_mode: str | None = None,
         max_episode_steps: int | None = None,
@@ -35,7 +35,7 @@ class MarathonParallelEnv(ParallelEnv[str, FloatArray, FloatArray]):
         """Make an environment; the arguments are those of `MarathonVectorEnv`."""
         limit = _spaces.steps_limit(max_episode_steps, None)
         self._env = _tasks.vec_env(
-            task, num_agents, threads=threads, autoreset="disabled", max_episode_steps=limit, copy=True, **options
+            task, num_envs, threads=threads, autoreset="disabled", max_episode_steps=limit, copy=True, **options
         )
         self.task_spec = self._env.spec
         self.metadata = {
@@ -46,7 +46,7 @@ class MarathonParallelEnv(ParallelEnv[str, FloatArray, FloatArray]):
         }
         _spaces.check_render_mode(render_mode, self.metadata)
         self.render_mode = render_mode
-        self.possible_agents = [f"agent_{i}" for i in range(num_agents)]
+        self.possible_agents = [f"agent_{i}" for i in range(num_envs)]
         self.agents: list[str] = []
         self._row = {name: i for i, name in enumerate(self.possible_agents)}
         self.observation_spaces: dict[str, gymnasium.Space[Any]] = {
@@ -56,7 +56,7 @@ class MarathonParallelEnv(ParallelEnv[str, FloatArray, FloatArray]):
             name: _spaces.action_space(self.task_spec) for name in self.possible_agents
         }
         self._dtype = next(iter(self.observation_spaces.values())).dtype
-        self._actions = np.zeros((num_agents, self.task_spec.act_size), np.float32)
+        self._actions = np.zeros((num_envs, self.task_spec.act_size), np.float32)
         self._task, self._size, self._options = task, (width, height), options
         self._renderer: _native.Renderer | None = None
         self._seconds = self._drawn = 0.0
@@ -112,7 +112,7 @@ class MarathonParallelEnv(ParallelEnv[str, FloatArray, FloatArray]):
         return results
 
     def state(self) -> FloatArray:
-        """Return the observations of all agents, `(num_agents, obs_size)`."""
+        """Return the observations of all agents, `(num_envs, obs_size)`."""
         return self._env.obs.astype(self._dtype)
 
     def render(self) -> FloatArray | None:
@@ -121,8 +121,8 @@ class MarathonParallelEnv(ParallelEnv[str, FloatArray, FloatArray]):
             gymnasium.logger.warn("render() does nothing without a render mode; make the environment with 'rgb_array'")
             return None
         if self._renderer is None:
-            agents = len(self.possible_agents)
-            self._renderer = _tasks.renderer(self._task, *self._size, agents, **self._options)
+            num_envs = len(self.possible_agents)
+            self._renderer = _tasks.renderer(self._task, *self._size, num_envs, **self._options)
         elapsed, self._drawn = self._seconds - self._drawn, self._seconds
         return self._renderer.render(self._env.get_state()[0], elapsed)
 

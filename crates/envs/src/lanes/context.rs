@@ -72,21 +72,11 @@ impl<T: Real> AgentContext for LaneContext<'_, T> {
     }
 
     fn vary(&mut self, variation: &Variation) -> Result<(), EnvError> {
-        let Variation { mass, friction, strength, gravity } = variation;
         let model = &self.task.blueprint.model;
-        check_length("mass [bodies]", mass.len(), model.bodies.len())?;
-        check_length("strength [actuators]", strength.len(), model.nu)?;
-        if let Some(x) = mass.iter().find(|x| !(x.is_finite() && **x > 0.0)) {
-            return refuse("mass", x, "a factor above 0");
-        }
-        if !(friction.is_finite() && *friction >= 0.0) {
-            return refuse("friction", friction, "a factor of 0 or more");
-        }
-        if let Some(x) = strength.iter().find(|x| !x.is_finite()) {
-            return refuse("strength", x, "a finite factor");
-        }
-        if let Some(x) = gravity.iter().find(|x| !x.is_finite()) {
-            return refuse("gravity", x, "finite numbers");
+        check_length("mass [bodies]", variation.mass.len(), model.bodies.len())?;
+        check_length("strength [actuators]", variation.strength.len(), model.nu)?;
+        if let Some((name, found, expected)) = variation.out_of_range() {
+            return refuse(name, found, expected);
         }
         self.group.physics.vary(&self.task.sim, self.lane, variation);
         Ok(())

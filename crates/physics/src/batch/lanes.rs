@@ -25,6 +25,7 @@ pub(super) trait Lanes: Send {
     fn load(&mut self, agent: usize, state: &AgentState);
     fn push(&mut self, agent: usize, body: usize, force: [f64; 3], torque: [f64; 3]);
     fn vary(&mut self, agent: usize, variation: &Variation);
+    fn ground(&self, agent: usize, field: usize) -> Vec<f32>;
     fn set_ground(&mut self, agent: usize, field: usize, elevations: &[f32]);
     /// Stores the current states. Keeps the newest `depth` of them.
     fn remember(&mut self, depth: usize);
@@ -162,6 +163,11 @@ impl<T: Real> Lanes for LaneBatch<T> {
     fn vary(&mut self, agent: usize, variation: &Variation) {
         let (g, lane) = Self::slot(agent);
         self.groups[g].vary(&self.sim, lane, variation);
+    }
+
+    fn ground(&self, agent: usize, field: usize) -> Vec<f32> {
+        let (g, lane) = Self::slot(agent);
+        self.groups[g].elevations(&self.sim, lane, field)
     }
 
     fn set_ground(&mut self, agent: usize, field: usize, elevations: &[f32]) {

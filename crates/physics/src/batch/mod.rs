@@ -228,6 +228,15 @@ impl Batch {
         self.inner.vary(agent, variation);
     }
 
+    /// An agent's ground: elevations, m above the zero of the model's height field `field`, row by row.
+    ///
+    /// # Panics
+    /// If the agent or the field does not exist.
+    pub fn ground(&self, agent: usize, field: usize) -> Vec<f32> {
+        assert!(agent < self.agents, "agent {agent} of {}", self.agents);
+        self.inner.ground(agent, field)
+    }
+
     /// Sets an agent's own ground: elevations, m above the zero of the model's height field `field`, row by row. It can
     /// change between steps and survives a reset.
     ///

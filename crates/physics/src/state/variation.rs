@@ -36,6 +36,17 @@ impl Variation {
             gravity: if model.opt.flags.gravity { model.opt.gravity } else { [0.0; 3] },
         }
     }
+
+    /// The first constant that is out of its range: its name, its value and the valid values.
+    pub fn out_of_range(&self) -> Option<(&'static str, f64, &'static str)> {
+        let Variation { mass, friction, strength, gravity } = self;
+        let first = |numbers: &[f64], valid: fn(f64) -> bool| numbers.iter().copied().find(|x| !valid(*x));
+        let mass = first(mass, |x| x.is_finite() && x > 0.0).map(|x| ("mass", x, "a factor above 0"));
+        let friction = || first(&[*friction], |x| x.is_finite() && x >= 0.0);
+        let strength = || first(strength, f64::is_finite).map(|x| ("strength", x, "a finite factor"));
+        let gravity = || first(gravity, f64::is_finite).map(|x| ("gravity", x, "finite numbers"));
+        mass.or_else(|| friction().map(|x| ("friction", x, "a factor of 0 or more"))).or_else(strength).or_else(gravity)
+    }
 }
 
 impl<T: Real> Group<T> {

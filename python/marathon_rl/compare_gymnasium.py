@@ -2,7 +2,7 @@
 
 The tasks of the same names agree with Gymnasium's, so a policy should score the same on both sides:
 
-    $ python -m marathon_rl.judge runs/Hopper-v5-1
+    $ python -m marathon_rl.compare_gymnasium runs/Hopper-v5-1
     Hopper-v5
       marathon   3664 +- 3 (100 episodes, 0 falls)
       gymnasium  3661 +- 4 (20 episodes, 0 falls)
@@ -55,7 +55,7 @@ class Score:
 
 
 @dataclass(frozen=True)
-class Judgment:
+class Comparison:
     """Scores of one policy on both sides."""
 
     task: str
@@ -91,7 +91,7 @@ class Judgment:
 def play_here(task: str, act: Act, episodes: int = 100, *, seed: int = 1, **options: Any) -> Score:
     """Play `episodes` episodes of a task of this package, all at once; `options` are arguments of the task."""
     _check(episodes)
-    env = VecEnv(task, episodes, seed=seed, autoreset="same_step", **options)
+    env = VecEnv(task, episodes, seed=seed, autoreset="same_step", dtype="float32", **options)
     obs = env.reset()
     returns, falls = np.zeros(episodes), 0
     going = np.ones(episodes, np.bool_)
@@ -128,7 +128,7 @@ def play_gymnasium(task: str, act: Act, episodes: int = 20, *, seed: int = 1, **
     return Score(tuple(returns), falls)
 
 
-def judge(task: str, act: Act, episodes: int = 20, *, here: int = 100, seed: int = 1) -> Judgment:
+def compare(task: str, act: Act, episodes: int = 20, *, here: int = 100, seed: int = 1) -> Comparison:
     """Play one policy on both sides.
 
     Args:
@@ -139,7 +139,7 @@ def judge(task: str, act: Act, episodes: int = 20, *, here: int = 100, seed: int
         here: episodes here, which cost little.
         seed: of the starts.
     """
-    return Judgment(task, play_here(task, act, here, seed=seed), play_gymnasium(task, act, episodes, seed=seed))
+    return Comparison(task, play_here(task, act, here, seed=seed), play_gymnasium(task, act, episodes, seed=seed))
 
 
 def _check(episodes: int) -> None:
@@ -148,8 +148,10 @@ def _check(episodes: int) -> None:
 
 
 def main(words: Sequence[str] | None = None) -> None:
-    """Judge the policies of a command line."""
-    parser = argparse.ArgumentParser("python -m marathon_rl.judge", description=str(__doc__).splitlines()[0])
+    """Compare the policies of a command line."""
+    parser = argparse.ArgumentParser(
+        "python -m marathon_rl.compare_gymnasium", description=str(__doc__).splitlines()[0]
+    )
     parser.add_argument("policies", nargs="+", metavar="POLICY", help="a policy file, or the folder of a run")
     parser.add_argument("--episodes", type=int, default=20, help="episodes in Gymnasium (default: 20)")
     parser.add_argument("--here", type=int, default=100, help="episodes here (default: 100)")
@@ -157,7 +159,7 @@ def main(words: Sequence[str] | None = None) -> None:
     args = parser.parse_args(words)
     for path in args.policies:
         policy = load_policy(path)
-        print(judge(policy.task, policy, args.episodes, here=args.here, seed=args.seed))
+        print(compare(policy.task, policy, args.episodes, here=args.here, seed=args.seed))
 
 
 if __name__ == "__main__":
