@@ -1,12 +1,12 @@
 //! The command line.
 
 use crate::bench::BenchArgs;
-use crate::film::Ghost;
 use crate::motion::MotionArgs;
+use crate::video::Ghost;
 use clap::{Parser, Subcommand};
 use marathon_learn::Algorithm;
 use marathon_runs::distill::DistillOptions;
-use marathon_runs::{FilmOptions, PolicySource, RunOptions, TaskOptions};
+use marathon_runs::{PolicySource, RunOptions, TaskOptions, VideoOptions};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -224,7 +224,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     #[command(flatten)]
-    pub film: FilmOptions,
+    pub video: VideoOptions,
     /// Number of frames of a .png strip [default: 8].
     #[arg(long, value_name = "N")]
     pub frames: Option<usize>,

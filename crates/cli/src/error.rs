@@ -13,7 +13,7 @@ use std::path::Path;
 /// An error with a text for the user: which file or option, what was found, what was expected.
 #[derive(Debug, thiserror::Error)]
 pub enum CliError {
-    /// An error of a run, a policy or a film.
+    /// An error of a run, a policy or a video.
     #[error("{}", program::spelled(|flags| .0.spelled(flags)))]
     Run(#[from] RunError),
     /// An error of a model file.

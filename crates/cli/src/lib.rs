@@ -10,9 +10,9 @@ mod args;
 mod bench;
 mod commands;
 mod error;
-mod film;
 mod motion;
 mod program;
+mod video;
 
 use args::{Args, Command};
 use clap::Parser;

@@ -1,4 +1,4 @@
-//! A picture or film that cannot be written completely is an error, and the older file of that name stays. The test
+//! A picture or video that cannot be written completely is an error, and the older file of that name stays. The test
 //! imitates a full disk: the system limits the size of every file that the process writes.
 
 #![cfg(target_os = "linux")]
@@ -9,7 +9,7 @@ use common::*;
 use std::process::Command;
 
 #[test]
-fn a_film_that_finds_no_room_is_an_error() {
+fn a_video_that_finds_no_room_is_an_error() {
     let temp = tempfile::tempdir().unwrap();
     let policy = shipped("hopper");
     let encoder = Command::new("ffmpeg").arg("-version").output().is_ok();

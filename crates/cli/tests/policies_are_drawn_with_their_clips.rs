@@ -52,7 +52,7 @@ fn a_policy_is_drawn_with_its_clip() {
 }
 
 #[test]
-fn a_film_begins_where_the_clip_does() {
+fn a_video_begins_where_the_clip_does() {
     let temp = trained("MarathonMan");
     let (run, path) = (clip("run.motion"), temp.path());
     let follow = ["motion", "render", &run, "--policy", "a"];

@@ -60,5 +60,5 @@ fn a_fall_is_shown_and_told() {
     let args = ["render", "a", "--out", "x.gif", "--width", "64", "--seconds", "20", "--json"];
     let report = json(&succeed(temp.path(), &args));
     assert_eq!(report["falls"], 1);
-    assert!(report["seconds"].as_f64().unwrap() < 19.0, "the film ends after the fall");
+    assert!(report["seconds"].as_f64().unwrap() < 19.0, "the video ends after the fall");
 }

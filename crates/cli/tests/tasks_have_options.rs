@@ -64,9 +64,9 @@ fn what_only_helps_to_learn_plays_along_if_it_is_asked_for() {
         let words = [&["--json", words[0], policy.to_str().unwrap()], &words[1..], &["--option", option]].concat();
         json(&succeed(temp.path(), &words))[number].as_f64().unwrap()
     };
-    let film = ["render", "--out", "a.png", "--frames", "2", "--seconds", "0.5", "--width", "40"];
+    let video = ["render", "--out", "a.png", "--frames", "2", "--seconds", "0.5", "--width", "40"];
     let demo = ["record-demo", "--out", "a.demo", "--episodes", "1"];
-    for (words, number) in [(&film[..], "distance_mean"), (&demo, "return_mean")] {
+    for (words, number) in [(&video[..], "distance_mean"), (&demo, "return_mean")] {
         assert_ne!(told(words, "start_pushed_prob=1", number), told(words, "start_pushed_prob=0", number), "{words:?}");
     }
 }

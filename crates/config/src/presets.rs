@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 
 macro_rules! preset {
     ($name:literal) => {
-        ($name, include_str!(concat!("../../../assets/configs/", $name)))
+        ($name, marathon_configs::text($name))
     };
 }
 

@@ -138,10 +138,23 @@ impl<A: Agent> AnyAgent for A {
     }
 
     fn shards_as(self: Arc<Self>, facts: Facts, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {
-        if !isa.supported() {
-            return Err(EnvError::Isa { isa: isa.name(), best: Isa::best().name() });
+        if let Some(obstacle) = obstacle(isa) {
+            return Err(EnvError::Isa { isa: isa.name(), obstacle, best: Isa::best().name() });
         }
         let options = Agent::options(&*self).into_iter().map(|o| (o.name.to_string(), o.value)).collect();
-        marathon_physics::with_lanes!(isa, T => Ok(Arc::new(AgentFactory::<T>::new(facts, options, self)?)))
+        #[cfg(feature = "double")]
+        if isa == Isa::F64 {
+            return Ok(Arc::new(AgentFactory::<f64>::new(facts, options, self)?));
+        }
+        marathon_physics::with_single_lanes!(isa, T => Ok(Arc::new(AgentFactory::<T>::new(facts, options, self)?)))
+    }
+}
+
+/// What keeps tasks from running in these lanes, if anything. Double precision needs the feature `double`: it adds a sixth to
+/// the time that a program takes to compile, and only comparisons with other engines use it.
+pub fn obstacle(isa: Isa) -> Option<&'static str> {
+    match isa {
+        Isa::F64 if !cfg!(feature = "double") => Some("this program was built without the feature `double`"),
+        isa => isa.obstacle(),
     }
 }

@@ -93,11 +93,13 @@ pub enum EnvError {
         /// The simulator's error.
         source: SimError,
     },
-    /// The processor lacks an instruction set.
-    #[error("this processor cannot run '{isa}'; the best it has is '{best}'")]
+    /// An instruction set that cannot be used.
+    #[error("cannot run '{isa}': {obstacle}; the best is '{best}'")]
     Isa {
         /// The requested instruction set.
         isa: &'static str,
+        /// What is missing.
+        obstacle: &'static str,
         /// The best available one.
         best: &'static str,
     },

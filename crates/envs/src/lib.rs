@@ -40,7 +40,7 @@ pub use agent::{
     OptionInfo, Options, Part, ResetNoise, RoleFacts, Senses, Sigmoid, Site, Start, Terms, Tolerance, Value, View,
     memory, names, options, senses, tolerance,
 };
-pub use any_agent::{AnyAgent, WithModel};
+pub use any_agent::{AnyAgent, WithModel, obstacle};
 pub use episode_rng::EpisodeRng;
 pub use error::EnvError;
 pub use external::{BatchAdapter, BatchTask, BatchTaskError, BatchTaskFailed};

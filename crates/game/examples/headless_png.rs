@@ -1,4 +1,4 @@
-//! A picture without a window: the app's own way of filming, called from a program.
+//! A picture without a window: the app's own recorder, called from a program.
 //!
 //! `cargo run --release -p marathon-game --example headless_png -- ants.png`
 

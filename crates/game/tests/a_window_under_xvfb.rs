@@ -198,7 +198,7 @@ fn an_environment_is_shown_in_its_time() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// SIGTERM ends the game cleanly, and recordings are saved. A film reports that it is not written.
+/// SIGTERM ends the game cleanly, and recordings are saved. A video reports that it is not written.
 #[test]
 fn signals_end_it_and_recordings_are_kept() -> Result<(), Box<dyn Error>> {
     let (_screen, display) = screen()?;
@@ -231,19 +231,19 @@ fn signals_end_it_and_recordings_are_kept() -> Result<(), Box<dyn Error>> {
         let path = folder.path().join(format!("hopper-{}.replay", number + 1));
         assert!(marathon_game::app::Recording::load(&path)?.seconds() > 0.2, "{signal}");
     }
-    let mut film = Command::new(env!("CARGO_BIN_EXE_marathon-game"));
-    film.args(["hopper", "--quality", "low", "--size", "320x200", "--seconds", "600", "--record", "a.mp4"]);
-    film.args(["--action", "0:record"]).current_dir(folder.path());
-    let mut film = start(film.stdout(Stdio::null()).stderr(Stdio::piped()))?;
+    let mut video = Command::new(env!("CARGO_BIN_EXE_marathon-game"));
+    video.args(["hopper", "--quality", "low", "--size", "320x200", "--seconds", "600", "--record", "a.mp4"]);
+    video.args(["--action", "0:record"]).current_dir(folder.path());
+    let mut video = start(video.stdout(Stdio::null()).stderr(Stdio::piped()))?;
     let (tell, told) = channel();
-    let lines = BufReader::new(film.0.stderr.take().ok_or("no errors")?).lines();
+    let lines = BufReader::new(video.0.stderr.take().ok_or("no errors")?).lines();
     std::thread::spawn(move || lines.map_while(Result::ok).try_for_each(|line| tell.send(line)));
     let mut words = Words(told, String::new());
     words.wait("a.mp4: ", 120);
     // a few frames more
     words.wait("a.mp4: ", 120);
-    Command::new("kill").args(["-INT", &film.0.id().to_string()]).status()?;
-    assert_eq!(film.0.wait()?.code(), Some(130));
+    Command::new("kill").args(["-INT", &video.0.id().to_string()]).status()?;
+    assert_eq!(video.0.wait()?.code(), Some(130));
     words.1 += &words.0.iter().collect::<Vec<_>>().join("\n");
     let text = &words.1;
     assert!(text.contains("interrupted: a.mp4 is not written"), "{text}");

@@ -21,7 +21,7 @@ pub const VARIABLE: &str = "MARATHON_LIMITS";
 pub enum Unit {
     /// Bytes of a file or of memory.
     Bytes,
-    /// Seconds of motion, film or waiting.
+    /// Seconds of motion, video or waiting.
     Seconds,
     /// Number of things, with their plural noun.
     Count(&'static str),
@@ -76,8 +76,8 @@ pub const TABLE_FILE: Limit =
     bytes("table_file", 256 * MB, "Size of a table, log or record of a run (CSV, JSON, events)");
 /// A configuration or mapping file.
 pub const CONFIG_FILE: Limit = bytes("config_file", MB, "Size of a configuration, mapping or settings file");
-/// Length of a film or of scripted play.
-pub const FILM_SECONDS: Limit = seconds("film_seconds", 3600, "Duration of a film or of scripted play");
+/// Length of a video or of scripted play.
+pub const VIDEO_SECONDS: Limit = seconds("video_seconds", 3600, "Duration of a video or of scripted play");
 
 /// Every limit, in the order of the documentation.
 pub const ALL: &[Limit] = &[
@@ -93,7 +93,7 @@ pub const ALL: &[Limit] = &[
     DEMONSTRATION_FILE,
     TABLE_FILE,
     CONFIG_FILE,
-    FILM_SECONDS,
+    VIDEO_SECONDS,
 ];
 
 /// An amount above a limit, or an invalid value of [`VARIABLE`].

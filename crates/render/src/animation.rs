@@ -1,4 +1,4 @@
-//! Animated GIF with one palette for the whole film.
+//! Animated GIF with one palette for the whole video.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -38,18 +38,18 @@ pub struct GifWriter {
 enum Stage {
     /// Collects frames for the palette. The file is still empty.
     Studying(File),
-    /// Writes frames. A [`Film`] is large, so it lives on the heap.
-    Writing(Box<Film>),
+    /// Writes frames. A [`Video`] is large, so it lives on the heap.
+    Writing(Box<Video>),
 }
 
-struct Film {
+struct Video {
     encoder: gif::Encoder<BufWriter<File>>,
     palette: Palette,
     previous: Vec<u8>,
 }
 
 impl GifWriter {
-    /// Starts a film. The file appears under its name only at [`finish`](Self::finish).
+    /// Starts a video. The file appears under its name only at [`finish`](Self::finish).
     ///
     /// # Errors
     /// [`RenderError::Fps`] unless `fps` is in 0.1..=50, [`RenderError::Io`].
@@ -85,7 +85,7 @@ impl GifWriter {
         self.write(frame)
     }
 
-    /// Ends the film and gives the file its name.
+    /// Ends the video and gives the file its name.
     ///
     /// # Errors
     /// [`RenderError::NoFrames`], [`RenderError::Io`], [`RenderError::Encode`].
@@ -94,8 +94,8 @@ impl GifWriter {
             return Err(RenderError::NoFrames { what: self.pending.path().display().to_string() });
         }
         self.start()?;
-        let Stage::Writing(film) = self.stage else { return Ok(()) };
-        let mut sink = film.encoder.into_inner().map_err(|error| refused(&self.pending, error))?;
+        let Stage::Writing(video) = self.stage else { return Ok(()) };
+        let mut sink = video.encoder.into_inner().map_err(|error| refused(&self.pending, error))?;
         sink.flush().map_err(RenderError::io(self.pending.path(), "cannot write"))?;
         drop(sink);
         self.pending.commit()
@@ -112,7 +112,7 @@ impl GifWriter {
         let mut encoder = gif::Encoder::new(BufWriter::new(file), width, height, &palette.table)
             .map_err(|error| refused(&self.pending, error))?;
         encoder.set_repeat(gif::Repeat::Infinite).map_err(|error| refused(&self.pending, error))?;
-        self.stage = Stage::Writing(Box::new(Film { encoder, palette, previous: Vec::new() }));
+        self.stage = Stage::Writing(Box::new(Video { encoder, palette, previous: Vec::new() }));
         for frame in std::mem::take(&mut self.waiting) {
             self.write(&frame)?;
         }
@@ -121,11 +121,11 @@ impl GifWriter {
 
     fn write(&mut self, image: &Image) -> Result<(), RenderError> {
         let delay = self.delay();
-        let Stage::Writing(film) = &mut self.stage else { return Ok(()) };
-        let indices = film.palette.map(image);
-        let changed = match film.previous.is_empty() {
+        let Stage::Writing(video) = &mut self.stage else { return Ok(()) };
+        let indices = video.palette.map(image);
+        let changed = match video.previous.is_empty() {
             true => Some([0, 0, image.width(), image.height()]),
-            false => changed_area(&film.previous, &indices, image.width()),
+            false => changed_area(&video.previous, &indices, image.width()),
         };
         // a GIF needs a frame for time to pass, even without changes
         let [left, top, right, bottom] = changed.unwrap_or([0, 0, 1, 1]);
@@ -133,7 +133,7 @@ impl GifWriter {
         let mut buffer = Vec::with_capacity((right - left) * (bottom - top));
         for y in top..bottom {
             let row = y * image.width() + left..y * image.width() + right;
-            match film.previous.get(row.clone()) {
+            match video.previous.get(row.clone()) {
                 Some(old) => {
                     let pairs = indices[row].iter().zip(old);
                     buffer.extend(pairs.map(|(&new, &old)| if new == old { UNCHANGED } else { new }));
@@ -151,13 +151,13 @@ impl GifWriter {
             buffer: buffer.into(),
             ..gif::Frame::default()
         };
-        film.encoder.write_frame(&frame).map_err(|error| refused(&self.pending, error))?;
-        film.previous = indices;
+        video.encoder.write_frame(&frame).map_err(|error| refused(&self.pending, error))?;
+        video.previous = indices;
         self.count += 1;
         Ok(())
     }
 
-    /// Duration of the next frame in hundredths of a second. Rounding errors do not add up over the film.
+    /// Duration of the next frame in hundredths of a second. Rounding errors do not add up over the video.
     fn delay(&self) -> u16 {
         let end_of = |frames: usize| (100.0 * frames as f64 / self.fps).round();
         (end_of(self.count + 1) - end_of(self.count)) as u16

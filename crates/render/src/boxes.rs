@@ -5,7 +5,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 /// Path of boxes from the file to the table of the frames.
 const TABLE: [&[u8; 4]; 6] = [b"moov", b"trak", b"mdia", b"minf", b"stbl", b"stsz"];
 
-/// Checks that the boxes of a file fill it exactly, that it contains the film's data, and that it has `frames` frames.
+/// Checks that the boxes of a file fill it exactly, that it contains the video's data, and that it has `frames` frames.
 ///
 /// # Errors
 /// [`io::ErrorKind::InvalidData`] with the missing part, or the file's I/O error.
@@ -76,19 +76,19 @@ mod tests {
         [&(8 + body.len() as u32).to_be_bytes()[..], kind, body].concat()
     }
 
-    fn film(frames: u32) -> Vec<u8> {
+    fn video(frames: u32) -> Vec<u8> {
         let mut table = one(b"stsz", &[[0; 4], [0; 4], frames.to_be_bytes()].concat());
         for kind in TABLE.iter().rev().skip(1) {
             table = [one(b"free", b"x"), one(kind, &table)].concat();
         }
-        // a box with a 64-bit size, as in films above 4 GB
+        // a box with a 64-bit size, as in videos above 4 GB
         let long = [&1u32.to_be_bytes()[..], b"mdat", &20u64.to_be_bytes(), b"data"].concat();
         [one(b"ftyp", b"isom"), table, long].concat()
     }
 
     #[test]
-    fn a_whole_film_passes_and_a_part_of_it_does_not() {
-        let whole = film(7);
+    fn a_whole_video_passes_and_a_part_of_it_does_not() {
+        let whole = video(7);
         check(&mut Cursor::new(&whole), 7).unwrap();
         let error = check(&mut Cursor::new(&whole), 8).unwrap_err().to_string();
         assert_eq!(error, "it has 7 of 8 frames");

@@ -49,7 +49,7 @@ pub enum RenderError {
         /// Width and height of the first frame.
         expected: [usize; 2],
     },
-    /// A strip or film without frames.
+    /// A strip or video without frames.
     #[error("{what}: no frames")]
     NoFrames {
         /// The strip or the path of the file.
@@ -77,7 +77,7 @@ pub enum RenderError {
         /// Highest rate.
         max: f64,
     },
-    /// A film that exceeds the memory or time budget.
+    /// A video that exceeds the memory or time budget.
     #[error("{}: {what} {source}", path.display())]
     Budget {
         /// The output file.

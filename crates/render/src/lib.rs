@@ -2,19 +2,19 @@
 //!
 //! ```no_run
 //! use marathon_render::{Corner, Follow, Recorder, Renderer, Scene, status_line};
-//! # fn film(model: &marathon_physics::Model, gait: &[Vec<f64>], speed: f64) -> Result<(), marathon_render::RenderError> {
+//! # fn video(model: &marathon_physics::Model, gait: &[Vec<f64>], speed: f64) -> Result<(), marathon_render::RenderError> {
 //! let scene = Scene::new(model);
 //! let renderer = Renderer::new(640, 360)?;
 //! let mut camera = Follow::new(&scene, 1, 640, 360);
-//! let mut film = Recorder::create("run.gif", 25.0, 8)?;
+//! let mut video = Recorder::create("run.gif", 25.0, 8)?;
 //! for (i, qpos) in gait.iter().enumerate() {
 //!     let frame = scene.frame(&[qpos])?;
 //!     let mut image = renderer.render(&frame, &camera.update(&frame, 1.0 / 25.0));
 //!     let at = frame.agents()[0].com[0];
 //!     image.caption(Corner::TopLeft, &[status_line(i as f64 / 25.0, at, speed)]);
-//!     film.push(&image)?;
+//!     video.push(&image)?;
 //! }
-//! film.finish()
+//! video.finish()
 //! # }
 //! ```
 //!

@@ -36,7 +36,7 @@ struct Running {
 }
 
 impl Mp4Writer {
-    /// Starts a film with the `ffmpeg` on the search path. The file appears under its name only at
+    /// Starts a video with the `ffmpeg` on the search path. The file appears under its name only at
     /// [`finish`](Self::finish).
     ///
     /// # Errors
@@ -87,7 +87,7 @@ impl Mp4Writer {
         }
     }
 
-    /// Waits for the encoder, checks that the film is complete and gives the file its final name.
+    /// Waits for the encoder, checks that the video is complete and gives the file its final name.
     ///
     /// # Errors
     /// [`RenderError::NoFrames`], [`RenderError::Ffmpeg`], [`RenderError::Io`].
@@ -100,7 +100,7 @@ impl Mp4Writer {
         match whole {
             Ok(()) => self.pending.commit(),
             // on a full disk, ffmpeg may exit with success and report the error only on stderr
-            Err(problem) => Err(self.failed(format!("the film is incomplete: {problem}"), words)),
+            Err(problem) => Err(self.failed(format!("the video is incomplete: {problem}"), words)),
         }
     }
 
@@ -151,7 +151,7 @@ impl Mp4Writer {
 impl Drop for Mp4Writer {
     fn drop(&mut self) {
         if let Some(mut running) = self.running.take() {
-            // the film was abandoned
+            // the video was abandoned
             let _ = running.child.kill();
             let _ = running.child.wait();
         }

@@ -1,4 +1,4 @@
-//! A common writer for films and pictures. The file's extension selects the format.
+//! A common writer for videos and pictures. The file's extension selects the format.
 
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ pub enum Format {
     Png,
     /// An animation for browsers and chats.
     Gif,
-    /// A film. It needs `ffmpeg`.
+    /// A video. It needs `ffmpeg`.
     Mp4,
 }
 
@@ -55,7 +55,7 @@ enum Sink {
 }
 
 impl Recorder {
-    /// Creates a file. `fps` is for films; `columns` is the number of frames per row of a `.png` strip.
+    /// Creates a file. `fps` is for videos; `columns` is the number of frames per row of a `.png` strip.
     ///
     /// # Errors
     /// [`RenderError::Extension`], [`RenderError::Fps`], [`RenderError::NoFfmpeg`], [`RenderError::Io`].

@@ -9,8 +9,8 @@ use marathon_render::{
     Camera, Corner, Format, GifWriter, Image, Mp4Writer, Recorder, RenderError, Renderer, status_line, strip,
 };
 
-/// Pictures of a moving camera, like a film of a run.
-fn film(count: usize) -> Vec<Image> {
+/// Pictures of a moving camera, like a video of a run.
+fn video(count: usize) -> Vec<Image> {
     let (frame, camera) = common::shapes();
     let renderer = Renderer::new(96, 60).unwrap();
     let shot = |i: usize| {
@@ -28,7 +28,7 @@ fn film(count: usize) -> Vec<Image> {
 #[test]
 fn png_holds_the_pixels() {
     let folder = Folder::new("png");
-    let image = &film(1)[0];
+    let image = &video(1)[0];
     image.save_png(folder.path("a.png")).unwrap();
     assert_eq!(read_png(&folder.path("a.png")), (96, 60, image.rgb().to_vec()));
     assert_eq!(folder.names(), ["a.png"]);
@@ -38,7 +38,7 @@ fn png_holds_the_pixels() {
 fn gif_has_every_frame_at_its_time_and_looks_alike() {
     let folder = Folder::new("gif");
     // more frames than the palette is learned from, with a still moment in between
-    let mut frames = film(30);
+    let mut frames = video(30);
     frames[12] = frames[11].clone();
     let mut writer = GifWriter::create(folder.path("run.gif"), 30.0).unwrap();
     for frame in &frames {
@@ -74,7 +74,7 @@ fn gif_has_every_frame_at_its_time_and_looks_alike() {
 
 #[test]
 fn strip_puts_frames_side_by_side() {
-    let frames = film(5);
+    let frames = video(5);
     let image = strip(&frames, 3).unwrap();
     assert_eq!([image.width(), image.height()], [3 * 96 + 2, 2 * 60 + 1]);
     for (i, frame) in frames.iter().enumerate() {
@@ -96,7 +96,7 @@ fn recorder_goes_by_the_extension() {
     let folder = Folder::new("recorder");
     for name in ["a.png", "a.GIF"] {
         let mut recorder = Recorder::create(folder.path(name), 25.0, 2).unwrap();
-        for frame in film(3) {
+        for frame in video(3) {
             recorder.push(&frame).unwrap();
         }
         recorder.finish().unwrap();
@@ -113,7 +113,7 @@ fn recorder_goes_by_the_extension() {
 #[test]
 fn failures_name_the_file_and_leave_none() {
     let folder = Folder::new("failures");
-    let frames = film(2);
+    let frames = video(2);
 
     let nowhere = folder.path("missing/a.png");
     let message = frames[0].save_png(&nowhere).unwrap_err().to_string();
@@ -158,9 +158,9 @@ fn stand_in(folder: &Folder, body: &str) -> String {
 #[test]
 fn mp4_feeds_the_encoder_every_byte() {
     let folder = Folder::new("mp4");
-    // put the frames into the boxes of a film, with a table that counts them
+    // put the frames into the boxes of a video, with a table that counts them
     let count = 3_u8;
-    let frames = film(count.into());
+    let frames = video(count.into());
     let mut table = vec![0, 0, 0, 20, b's', b't', b's', b'z', 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, count];
     for kind in [b"stbl", b"minf", b"mdia", b"trak", b"moov"] {
         table = [&(8 + table.len() as u32).to_be_bytes()[..], kind, &table].concat();
@@ -185,15 +185,15 @@ fn mp4_feeds_the_encoder_every_byte() {
 #[test]
 fn mp4_reports_the_encoders_own_words() {
     let folder = Folder::new("mp4-fails");
-    let program = stand_in(&folder, "echo 'no space for this film' >&2; exit 3");
+    let program = stand_in(&folder, "echo 'no space for this video' >&2; exit 3");
     let mut writer = Mp4Writer::with_program(folder.path("run.mp4"), 25.0, &program).unwrap();
     // the pipe may take a few frames before the writer notices that its reader is gone
-    let failed = film(40).iter().find_map(|frame| writer.push(frame).err());
+    let failed = video(40).iter().find_map(|frame| writer.push(frame).err());
     let message = match failed {
         Some(error) => error.to_string(),
         None => writer.finish().unwrap_err().to_string(),
     };
-    assert!(message.contains("run.mp4") && message.contains("no space for this film"), "{message}");
+    assert!(message.contains("run.mp4") && message.contains("no space for this video"), "{message}");
     assert!(!folder.names().contains(&"run.mp4".to_owned()));
 }
 

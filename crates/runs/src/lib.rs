@@ -1,7 +1,7 @@
 //! Training runs: their options, folders, reports and policies, and processes that play rollouts for them.
 //!
 //! The command line, the studies, the game and the Python package are front ends of this crate. [`RunOptions`],
-//! [`PolicySource`] and [`FilmOptions`] are plain structs. The feature `clap` turns them into arguments of a command
+//! [`PolicySource`] and [`VideoOptions`] are plain structs. The feature `clap` turns them into arguments of a command
 //! line. The feature `terminal` adds output, Ctrl-C and exit codes for programs in a terminal. A [`RunError`] carries
 //! the names of options, and each front end spells them in its own way ([`Spelling`]).
 
@@ -35,7 +35,7 @@ pub use controller::CommandTracking;
 pub use error::{Flags, Plain, RunError, Spelling};
 pub use folder::RunFolder;
 pub use imitation::Imitation;
-pub use options::{FilmOptions, LearnOptions, PolicySource, RunOptions};
+pub use options::{LearnOptions, PolicySource, RunOptions, VideoOptions};
 pub use play::Play;
 pub use report::Watch;
 pub use report::summary::Summary;

@@ -1,4 +1,4 @@
-//! Options of runs, policies and films: plain structs that every front end fills. The feature `clap` makes them
+//! Options of runs, policies and videos: plain structs that every front end fills. The feature `clap` makes them
 //! command-line arguments, with these texts as the help.
 
 use crate::error::RunError;
@@ -6,7 +6,7 @@ use crate::policy_file;
 use crate::task_config::TaskOptions;
 use marathon_envs::ShardFactory;
 use marathon_learn::{Algorithm, Policy};
-use marathon_physics::budget::FILM_SECONDS;
+use marathon_physics::budget::VIDEO_SECONDS;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -140,7 +140,7 @@ impl PolicySource {
 /// Length and frame rate of a video.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
-pub struct FilmOptions {
+pub struct VideoOptions {
     /// Length of the video, s [default: 8; 2 for a strip of frames].
     #[cfg_attr(feature = "clap", arg(long, value_name = "S", allow_negative_numbers = true))]
     pub seconds: Option<f64>,
@@ -152,7 +152,7 @@ pub struct FilmOptions {
     pub fps: Option<f64>,
 }
 
-impl FilmOptions {
+impl VideoOptions {
     /// Highest frame rate, frames per second.
     pub const MOST_FPS: f64 = 1000.0;
     /// Lowest frame rate, frames per second. A video has at least one frame.
@@ -173,7 +173,7 @@ impl FilmOptions {
             _ => {}
         }
         for (name, seconds) in [("seconds", self.seconds.unwrap_or(0.0)), ("start", self.start)] {
-            FILM_SECONDS.check(seconds).map_err(|error| RunError::option(name, error.to_string()))?;
+            VIDEO_SECONDS.check(seconds).map_err(|error| RunError::option(name, error.to_string()))?;
         }
         Ok(())
     }

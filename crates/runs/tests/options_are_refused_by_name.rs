@@ -1,7 +1,7 @@
 //! An invalid option is refused by its name, in the spelling of each front end: `steps` for a caller of the library,
 //! `--steps` for a user of the command.
 
-use marathon_runs::{FilmOptions, Flags, LearnOptions, RunError, RunOptions, Session, Task};
+use marathon_runs::{Flags, LearnOptions, RunError, RunOptions, Session, Task, VideoOptions};
 
 /// The text of a refusal with plain names.
 #[track_caller]
@@ -38,15 +38,15 @@ fn options_that_do_not_go_together_are_refused_by_their_names() {
 }
 
 #[test]
-fn films_have_a_length_and_a_rate() {
-    assert!(FilmOptions::default().validate().is_ok());
-    for (name, film) in [
-        ("seconds", FilmOptions { seconds: Some(-1.0), ..Default::default() }),
-        ("seconds", FilmOptions { seconds: Some(f64::NAN), ..Default::default() }),
-        ("fps", FilmOptions { fps: Some(0.0), ..Default::default() }),
-        ("start", FilmOptions { start: 1e9, ..Default::default() }),
+fn videos_have_a_length_and_a_rate() {
+    assert!(VideoOptions::default().validate().is_ok());
+    for (name, video) in [
+        ("seconds", VideoOptions { seconds: Some(-1.0), ..Default::default() }),
+        ("seconds", VideoOptions { seconds: Some(f64::NAN), ..Default::default() }),
+        ("fps", VideoOptions { fps: Some(0.0), ..Default::default() }),
+        ("start", VideoOptions { start: 1e9, ..Default::default() }),
     ] {
-        let text = refused(film.validate());
+        let text = refused(video.validate());
         assert!(text.starts_with(&format!("{name} is ")) || text.starts_with(&format!("{name} asks for ")), "{text}");
     }
 }

@@ -12,8 +12,8 @@ use std::path::Path;
 const AGENT: &str = "Hopper-v0";
 /// Configurations of both trainers: the paper's for this agent, and one with the keys of today's ML-Agents.
 const FILES: [(&str, &[u8]); 2] = [
-    ("paper-appendix-c", include_bytes!("../../../assets/configs/paper-appendix-c.yaml")),
-    ("hopper-mlagents", include_bytes!("../../../assets/configs/hopper-mlagents.yaml")),
+    ("paper-appendix-c", marathon_configs::text("paper-appendix-c.yaml").as_bytes()),
+    ("hopper-mlagents", marathon_configs::text("hopper-mlagents.yaml").as_bytes()),
 ];
 const TIME_HORIZON: u64 = 128;
 /// Agents of the paper's scenes.

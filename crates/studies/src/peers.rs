@@ -268,7 +268,7 @@ mod tests {
 
     #[test]
     fn a_configuration_survives_the_way_to_mlagents_and_back() {
-        let text = include_bytes!("../../../assets/configs/hopper-mlagents.yaml");
+        let text = marathon_configs::text("hopper-mlagents.yaml").as_bytes();
         let mut ppo = config::parse(Path::new("a.yaml"), text, "Hopper-v0").unwrap().config;
         let written = file("Hopper-v0", &ppo, 128).to_string();
         let read = config::parse(Path::new("b.yaml"), written.as_bytes(), "Hopper-v0").unwrap().config;

@@ -12,7 +12,7 @@ use marathon_runs::text::thousands;
 use std::path::Path;
 
 /// The paper's settings.
-const PAPER: &[u8] = include_bytes!("../../../assets/configs/paper-appendix-b.yaml");
+const PAPER: &[u8] = marathon_configs::text("paper-appendix-b.yaml").as_bytes();
 /// Agents, and the agent-steps per second that the paper reports.
 const AGENTS: [(&str, f64); 4] =
     [("Hopper-v0", 2190.0), ("Walker2d-v0", 2149.0), ("Ant-v0", 2359.0), ("Humanoid-v0", 1229.0)];

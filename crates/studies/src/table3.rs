@@ -13,7 +13,7 @@ use std::path::Path;
 
 const AGENT: &str = "Hopper-v0";
 /// The settings of the paper's ML-Agents side.
-const PAPER: &[u8] = include_bytes!("../../../assets/configs/paper-appendix-c.yaml");
+const PAPER: &[u8] = marathon_configs::text("paper-appendix-c.yaml").as_bytes();
 
 /// `time_horizon` of the paper's file.
 const TIME_HORIZON: u64 = 128;

@@ -54,7 +54,9 @@ pub fn run(args: &EnvArgs, json: bool) -> Result<(), CliError> {
     let step = "one decision of one agent: random actions, physics, observation, reward, resets";
     let mut table = Table::new(json, Head::new("env", threads), args.seconds, step);
     for id in &agents {
-        for isa in isas(&args.isa) {
+        // all that can run, or those that were asked for
+        let can = |isa: &Isa| !args.isa.is_empty() || marathon_envs::obstacle(*isa).is_none();
+        for isa in isas(&args.isa).into_iter().filter(can) {
             let factory = TaskConfig::named(id)?.with(&args.task)?.factory_on(isa)?;
             table.push(measure(threads, args.seconds, &*factory, isa));
         }

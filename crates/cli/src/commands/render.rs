@@ -1,8 +1,8 @@
-//! `marathon render`: films a policy.
+//! `marathon render`: records a policy.
 
 use crate::args::RenderArgs;
 use crate::error::CliError;
-use crate::film::{Cast, Shot, shoot};
+use crate::video::{Cast, Shot, shoot};
 use marathon_physics::budget::MEMORY;
 use marathon_render::Format;
 use marathon_runs::terminal::{interrupt, print_json, say};
@@ -14,7 +14,7 @@ const PIXEL: f64 = 4.0;
 /// Maximum number of agents side by side.
 const MAX_AGENTS: usize = 64;
 
-/// Plays a policy with its best actions and films it.
+/// Plays a policy with its best actions and records it.
 ///
 /// # Errors
 /// If there is no such policy, an option is invalid, or the picture cannot be written.
@@ -22,7 +22,7 @@ pub fn run(args: &RenderArgs, json: bool) -> Result<(), CliError> {
     let shot = shot(args)?;
     output::check(&args.out, &["png", "gif", "mp4"], &[&args.source.policy])?;
     let (policies, factory) = args.source.load_all()?;
-    let cast = Cast { agents: args.agents, seed: args.seed, start: args.film.start, ghost: args.ghost };
+    let cast = Cast { agents: args.agents, seed: args.seed, start: args.video.start, ghost: args.ghost };
     interrupt::install("leaving without a picture")?;
     let report = shoot(&policies, factory.spec(), &shot, &cast, &args.out)?;
     if json {
@@ -59,10 +59,10 @@ fn shot(args: &RenderArgs) -> Result<Shot, CliError> {
         // video encoders need even sides
         _ => width.saturating_mul(9) / 16 / 2 * 2,
     });
-    let (length, fps) = (args.film.seconds.unwrap_or(seconds), args.film.fps.unwrap_or(fps));
+    let (length, fps) = (args.video.seconds.unwrap_or(seconds), args.video.fps.unwrap_or(fps));
     let frames = args.frames.unwrap_or(8);
     let usage = |text: String| Err(CliError::Usage(text));
-    args.film.validate()?;
+    args.video.validate()?;
     if !(1..=1000).contains(&frames) {
         return usage(format!("--frames is {frames}, expected 1 to 1000"));
     }
@@ -70,9 +70,9 @@ fn shot(args: &RenderArgs) -> Result<Shot, CliError> {
         return usage(format!("--agents is {}, expected 1 to {MAX_AGENTS}", args.agents));
     }
     match format {
-        Format::Png if args.film.fps.is_some() => usage("--fps is for .gif and .mp4; a .png has --frames".into()),
+        Format::Png if args.video.fps.is_some() => usage("--fps is for .gif and .mp4; a .png has --frames".into()),
         Format::Gif | Format::Mp4 if args.frames.is_some() => {
-            usage("--frames is for .png; a film has --seconds and --fps".into())
+            usage("--frames is for .png; a video has --seconds and --fps".into())
         }
         _ => {
             // pixels of all frames in memory, and of the picture made from them

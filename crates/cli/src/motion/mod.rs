@@ -6,7 +6,7 @@ mod policy;
 mod show;
 
 use crate::error::CliError;
-use crate::film::Ghost;
+use crate::video::Ghost;
 use clap::{Subcommand, ValueEnum};
 use marathon_motion::import::Up;
 use marathon_runs::TaskOptions;
@@ -38,7 +38,7 @@ pub enum What {
     Retarget(RetargetArgs),
     /// Check clips for problems; the exit code is 1 if there are any.
     Check(CheckArgs),
-    /// Draw a clip, alone or with a policy that follows it: a strip of frames, an animation or a film.
+    /// Draw a clip, alone or with a policy that follows it: a strip of frames, an animation or a video.
     Render(RenderArgs),
 }
 
@@ -154,7 +154,7 @@ pub struct RenderArgs {
     /// Character: an agent, or an MJCF file [default: the agent that the clip names].
     #[arg(long, value_name = "AGENT|F.xml")]
     pub model: Option<String>,
-    /// Picture to write: .png is a strip of frames, .gif an animation, .mp4 a film (needs ffmpeg).
+    /// Picture to write: .png is a strip of frames, .gif an animation, .mp4 a video (needs ffmpeg).
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Policy that follows the clip, a file or the folder of a run: draw it, with the clip as its ghost, from the
@@ -167,13 +167,13 @@ pub struct RenderArgs {
     /// Options of the policy's task.
     #[command(flatten)]
     pub task: TaskOptions,
-    /// Length, seconds [default: that of the clip; 8 for a film of a policy whose clip loops].
+    /// Length, seconds [default: that of the clip; 8 for a video of a policy whose clip loops].
     #[arg(long, value_name = "S")]
     pub seconds: Option<f64>,
     /// Frames of a .png strip.
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u64).range(1..=1000))]
     pub frames: u64,
-    /// Frames per second of a film.
+    /// Frames per second of a video.
     #[arg(long, value_name = "HZ", default_value_t = 25.0)]
     pub fps: f64,
     /// Width of a frame, pixels [default: 240 for .png, 480 otherwise].

@@ -2,7 +2,7 @@
 
 use super::{RenderArgs, model, show};
 use crate::error::CliError;
-use crate::film::{Cast, Ghost, shoot};
+use crate::video::{Cast, Ghost, shoot};
 use marathon_envs::options::Value;
 use marathon_envs::registry;
 use marathon_learn::{EvalOptions, PolicyMeta};
@@ -13,7 +13,7 @@ use marathon_runs::text::path_word;
 use marathon_runs::{PolicySource, TaskOptions, policy_file};
 use std::path::Path;
 
-/// Minimum duration of a film of a looping clip, s.
+/// Minimum duration of a video of a looping clip, s.
 const LOOP: f64 = 8.0;
 
 /// Draws a policy with the clip as its ghost, from the clip's first frame on.

@@ -2,7 +2,7 @@
 
 use super::{CheckArgs, RenderArgs, model};
 use crate::error::CliError;
-use crate::film::Shot;
+use crate::video::Shot;
 use marathon_motion::{Fit, Report, soles};
 use marathon_render::{Corner, Follow, Format, Recorder, Renderer, Scene};
 use marathon_runs::terminal::{interrupt, print_json, say};

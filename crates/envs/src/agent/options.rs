@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use marathon_motion::Clip;
-use marathon_physics::budget::FILM_SECONDS;
+use marathon_physics::budget::VIDEO_SECONDS;
 
 pub use super::clips::{Clips, NamedClip};
 pub use super::value::Value;
@@ -223,13 +223,13 @@ impl OptionValue for Share {
 pub struct Seconds(pub f64);
 
 impl OptionValue for Seconds {
-    const EXPECTED: &'static str = "seconds, from 0 to the limit 'film_seconds' (3600)";
+    const EXPECTED: &'static str = "seconds, from 0 to the limit 'video_seconds' (3600)";
     fn value(&self) -> Value {
         Value::Number(self.0)
     }
     fn read(value: &Value) -> Option<Self> {
         match value {
-            Value::Number(x) if *x >= 0.0 && FILM_SECONDS.check(*x).is_ok() => Some(Seconds(*x)),
+            Value::Number(x) if *x >= 0.0 && VIDEO_SECONDS.check(*x).is_ok() => Some(Seconds(*x)),
             _ => None,
         }
     }

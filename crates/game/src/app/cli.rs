@@ -18,7 +18,7 @@ use marathon_envs::registry;
 use marathon_learn::EvalOptions;
 use marathon_physics::Model;
 use marathon_runs::folder::policy_path;
-use marathon_runs::{FilmOptions, LearnOptions, RunError, TaskConfig, TaskOptions, policy_file};
+use marathon_runs::{LearnOptions, RunError, TaskConfig, TaskOptions, VideoOptions, policy_file};
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -36,14 +36,14 @@ Examples:
   marathon-game --mode testbed my-robot.xml      a slider per motor
   marathon-game ant --ground stairs              or hills, or boards
   marathon-game MarathonManRun --skin marathon_man   with the skin of a person; or with that of hero.glb
-  marathon-game hopper --record hop.mp4          a film, without a window (needs ffmpeg)
+  marathon-game hopper --record hop.mp4          a video, without a window (needs ffmpeg)
   marathon-game hopper --mode push --action 1.5:throw --record ball.mp4   the same with a ball thrown at it
   marathon-game --replay run.replay              what R recorded, with a time line
   marathon-game hopper --agents 16 --mlagents-port 5004   mlagents-learn trains while you watch
 
 Keys are shown on the screen (F1) and can be changed in the menu.";
 
-/// Watch, push, teach and film physical characters.
+/// Watch, push, teach and record physical characters.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "marathon-game", version, about, after_help = EXAMPLES)]
 pub struct Args {
@@ -135,7 +135,7 @@ pub struct Args {
     /// Quality of the picture [default: medium, or low if a processor draws the window].
     #[arg(long, value_parser = one_of(QUALITIES))]
     pub quality: Option<Quality>,
-    /// Size of the window or the film, pixels [default: 1280x720].
+    /// Size of the window or the video, pixels [default: 1280x720].
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<(u32, u32)>,
     /// Place of the camera.
@@ -151,21 +151,21 @@ pub struct Args {
     #[arg(long)]
     pub joints: bool,
 
-    /// Film to write instead of opening a window: .mp4 (needs ffmpeg), .png (one picture, of the last frame), or a folder for
+    /// Video to write instead of opening a window: .mp4 (needs ffmpeg), .png (one picture, of the last frame), or a folder for
     /// a sequence of .png.
     #[arg(long, value_name = "OUT")]
     pub record: Option<PathBuf>,
-    /// Times of the film.
+    /// Times of the video.
     #[command(flatten)]
-    pub film: FilmOptions,
-    /// Film without text and bars.
+    pub video: VideoOptions,
+    /// Video without text and bars.
     #[arg(long)]
     pub no_hud: bool,
 }
 
-/// Default size of a window or film, pixels.
+/// Default size of a window or video, pixels.
 const SIZE: (u32, u32) = (1280, 720);
-/// Default length of a film, s, and its frames per second.
+/// Default length of a video, s, and its frames per second.
 const SECONDS: f64 = 8.0;
 const FPS: f64 = 30.0;
 
@@ -194,7 +194,7 @@ impl Args {
         Mappings { pad: Mapping { dead_zone, curve, smoothing }, keys }
     }
 
-    /// Size of the window or film, pixels.
+    /// Size of the window or video, pixels.
     pub fn size(&self) -> (u32, u32) {
         self.size.unwrap_or(SIZE)
     }
@@ -204,14 +204,14 @@ impl Args {
         self.learn.seed.unwrap_or(EvalOptions::default().seed)
     }
 
-    /// Length of the film, seconds.
+    /// Length of the video, seconds.
     pub fn seconds(&self) -> f64 {
-        self.film.seconds.unwrap_or(SECONDS)
+        self.video.seconds.unwrap_or(SECONDS)
     }
 
-    /// Frames per second of the film.
+    /// Frames per second of the video.
     pub fn fps(&self) -> f64 {
-        self.film.fps.unwrap_or(FPS)
+        self.video.fps.unwrap_or(FPS)
     }
 
     /// The settings that other programs must not change.

@@ -72,7 +72,7 @@ pub enum GameError {
     Outside(String),
     /// There is no display.
     #[error(
-        "there is no display to open a window on (DISPLAY is {0}); on a machine without a screen, film instead: \
+        "there is no display to open a window on (DISPLAY is {0}); on a machine without a screen, record a video instead: \
          marathon-game hopper --record hop.mp4, or start a virtual one: xvfb-run marathon-game"
     )]
     NoDisplay(String),
@@ -83,9 +83,9 @@ pub enum GameError {
          (Fedora); then `vulkaninfo --summary` lists a device"
     )]
     NoGraphics,
-    /// A film or picture that cannot be written.
+    /// A video or picture that cannot be written.
     #[error(transparent)]
-    Film(#[from] marathon_render::RenderError),
+    Video(#[from] marathon_render::RenderError),
     /// A file could not be written.
     #[error("cannot write {}: {source}", .path.display())]
     Write {

@@ -1,4 +1,4 @@
-//! The start of the app: from a command line to a window or a film.
+//! The start of the app: from a command line to a window or a video.
 
 use crate::app::cli::Args;
 use crate::app::error::GameError;
@@ -7,7 +7,7 @@ use crate::app::features::remote::{mailbox, mlagents, pipe};
 use crate::app::game::GamePlugin;
 use crate::app::pacing::FramePace;
 use crate::app::ui::question;
-use crate::app::video::{self, Film};
+use crate::app::video::{self, Video};
 use crate::app::{display, interrupt};
 use bevy::app::{PluginGroupBuilder, TerminalCtrlCHandlerPlugin};
 use bevy::prelude::*;
@@ -63,9 +63,9 @@ pub fn run(args: &Args) -> Result<(), GameError> {
     }
     let mut game = GamePlugin::new(args)?;
     if let Some(out) = &args.record {
-        args.film.validate()?;
-        let film = Film { out, size: args.size(), fps: args.fps(), start: args.film.start, seconds: args.seconds() };
-        return video::record(&film, game);
+        args.video.validate()?;
+        let video = Video { out, size: args.size(), fps: args.fps(), start: args.video.start, seconds: args.seconds() };
+        return video::record(&video, game);
     }
     display::check_display()?;
     if display::check_graphics()? && args.quality.is_none() {

@@ -21,9 +21,9 @@ pub struct FixedSettings {
     pub rate: bool,
 }
 
-/// The app draws a film: its time does not depend on how fast frames are drawn.
+/// The app draws a video: its time does not depend on how fast frames are drawn.
 #[derive(Resource)]
-pub struct Filmed;
+pub struct IsVideo;
 
 pub(super) fn plugin(app: &mut App) {
     app.insert_resource(Time::<Fixed>::from_hz(TICKS)).add_systems(Last, wait.run_if(resource_exists::<FramePace>));

@@ -1,11 +1,11 @@
-//! Films without a window: every frame is as long as the last, drawn to an image, and written out. The same command gives
+//! Videos without a window: every frame is as long as the last, drawn to an image, and written out. The same command gives
 //! the same run, however slow the machine.
 
 use crate::app::display::check_graphics;
 use crate::app::error::GameError;
 use crate::app::features::replay::record::save_running;
 use crate::app::interrupt;
-use crate::app::pacing::{Filmed, TICKS};
+use crate::app::pacing::{IsVideo, TICKS};
 use crate::app::stage::skin::{SkinState, WornSkin};
 use bevy::app::{PluginsState, TerminalCtrlCHandlerPlugin};
 use bevy::asset::RenderAssetUsages;
@@ -25,12 +25,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Frames before the first one of the film, in which the graphics card gets its data.
+/// Frames before the first one of the video, in which the graphics card gets its data.
 const WARM_UP: usize = 4;
 /// Limit on the frames that a picture comes late.
 const PATIENCE: usize = 200;
 
-/// Time between two lines about how far the film is.
+/// Time between two lines about how far the video is.
 const REPORT: Duration = Duration::from_secs(5);
 
 /// Longest time that a skin takes to read.
@@ -42,7 +42,7 @@ struct Reel(VecDeque<Vec<u8>>);
 
 /// The destination of the pictures.
 enum Sink {
-    Film(Recorder),
+    Video(Recorder),
     /// The last one only.
     Png(PathBuf, Option<Picture>),
     Folder(PathBuf, usize),
@@ -56,13 +56,13 @@ impl Sink {
         }
         Ok(match Format::of(path)? {
             Format::Png => Sink::Png(path.into(), None),
-            Format::Gif | Format::Mp4 => Sink::Film(Recorder::create(path, fps, 1)?),
+            Format::Gif | Format::Mp4 => Sink::Video(Recorder::create(path, fps, 1)?),
         })
     }
 
     fn push(&mut self, picture: Picture) -> Result<(), GameError> {
         match self {
-            Sink::Film(recorder) => recorder.push(&picture)?,
+            Sink::Video(recorder) => recorder.push(&picture)?,
             Sink::Png(_, last) => *last = Some(picture),
             Sink::Folder(path, count) => {
                 *count += 1;
@@ -74,7 +74,7 @@ impl Sink {
 
     fn finish(self) -> Result<(), GameError> {
         match self {
-            Sink::Film(recorder) => recorder.finish()?,
+            Sink::Video(recorder) => recorder.finish()?,
             Sink::Png(path, last) => match last {
                 Some(picture) => picture.save_png(path)?,
                 None => return Err(GameError::NoGraphics),
@@ -85,8 +85,8 @@ impl Sink {
     }
 }
 
-/// A film to record.
-pub struct Film<'a> {
+/// A video to record.
+pub struct Video<'a> {
     /// The file or folder.
     pub out: &'a Path,
     /// Width and height, pixels.
@@ -99,19 +99,19 @@ pub struct Film<'a> {
     pub seconds: f64,
 }
 
-/// Records a film of the game.
+/// Records a video of the game.
 ///
 /// # Errors
-/// If there are no graphics, or the film cannot be written.
-pub fn record(film: &Film<'_>, game: impl Plugin) -> Result<(), GameError> {
-    let Film { out, size: (width, height), fps, start, seconds } = *film;
+/// If there are no graphics, or the video cannot be written.
+pub fn record(video: &Video<'_>, game: impl Plugin) -> Result<(), GameError> {
+    let Video { out, size: (width, height), fps, start, seconds } = *video;
     // before there is a file that a signal would leave behind
     interrupt::listen();
     let mut sink = Sink::new(out, fps)?;
     check_graphics()?;
     let frame = Duration::from_secs_f64(1.0 / fps);
     let mut app = windowless(game);
-    // film time equals simulated time at any frame rate
+    // video time equals simulated time at any frame rate
     let longest = app.world().resource::<Time<Virtual>>().max_delta().max(frame);
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(longest);
     while app.plugins_state() == PluginsState::Adding {
@@ -136,7 +136,7 @@ pub fn record(film: &Film<'_>, game: impl Plugin) -> Result<(), GameError> {
             }
         }
     };
-    // frames before the film are not drawn; at least one tick, in which the characters come
+    // frames before the video are not drawn; at least one tick, in which the characters come
     draw(&mut app, false);
     let before = (start / frame.as_secs_f64()).round() as usize;
     pace(&mut app, Duration::from_secs_f64(1.0 / TICKS));
@@ -168,7 +168,7 @@ pub fn record(film: &Film<'_>, game: impl Plugin) -> Result<(), GameError> {
         if drawn < frames {
             pace(&mut app, if drawn == 0 { Duration::ZERO } else { frame });
             drawn += 1;
-            // a film ends when its game ends
+            // a video ends when its game ends
             if over || app.should_exit().is_some() {
                 frames = drawn;
             }
@@ -215,7 +215,7 @@ fn windowless(game: impl Plugin) -> App {
     )
     .add_plugins(game)
     .init_resource::<Reel>()
-    .insert_resource(Filmed)
+    .insert_resource(IsVideo)
     .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
     app
 }

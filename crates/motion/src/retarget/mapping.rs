@@ -104,9 +104,9 @@ pub struct Mapping {
 
 /// Built-in mappings by the model's name. Their joints are those of [`roles`].
 const BUILT_IN: [(&str, &str); 3] = [
-    ("marathon_man", include_str!("../../../../assets/motions/mappings/marathon_man.json")),
-    ("humanoid", include_str!("../../../../assets/motions/mappings/humanoid.json")),
-    ("walker2d", include_str!("../../../../assets/motions/mappings/walker2d.json")),
+    ("marathon_man", marathon_assets::text("motions/mappings/marathon_man.json")),
+    ("humanoid", marathon_assets::text("motions/mappings/humanoid.json")),
+    ("walker2d", marathon_assets::text("motions/mappings/walker2d.json")),
 ];
 
 impl Mapping {

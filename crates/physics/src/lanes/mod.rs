@@ -338,6 +338,20 @@ macro_rules! with_lanes {
                 type $T = f64;
                 $body
             }
+            isa => $crate::with_single_lanes!(isa, $T => $body),
+        }
+    };
+}
+
+/// The same for what is never computed in double precision.
+///
+/// # Panics
+/// With [`Isa::F64`].
+#[macro_export]
+macro_rules! with_single_lanes {
+    ($isa:expr, $T:ident => $body:expr) => {
+        match $isa {
+            $crate::lanes::Isa::F64 => unreachable!("double precision where there is none"),
             $crate::lanes::Isa::F32 => {
                 type $T = f32;
                 $body

@@ -155,7 +155,7 @@ fn main() -> AppExit {
         .add_plugins((DefaultPlugins.set(assets()), MarathonPlugin, PropsPlugin))
         .add_plugins((LookPlugin, SceneryPlugin(Quality::Medium), FollowCameraPlugin))
         .add_systems(Startup, (build_wall, spawn_hopper))
-        .add_systems(Update, (paint, film))
+        .add_systems(Update, (paint, video))
         .run()
 }
 
@@ -181,7 +181,7 @@ fn paint(
 
 /// Points a camera at the runner.
 #[cfg(feature = "window")]
-fn film(mut commands: Commands, new: Query<Entity, Added<Ragdoll>>) {
+fn video(mut commands: Commands, new: Query<Entity, Added<Ragdoll>>) {
     for runner in &new {
         commands.spawn(FollowCamera::following(runner));
     }

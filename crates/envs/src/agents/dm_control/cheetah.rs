@@ -10,7 +10,7 @@ use crate::agent::{Agent, Body, Facts, Obs, OptionInfo, OptionSet, Options, Sens
 
 const DOMAIN: Domain = Domain {
     file: "cheetah.xml",
-    text: include_str!("../../../../../assets/dm_control/cheetah.xml"),
+    text: marathon_assets::text("dm_control/cheetah.xml"),
     frame_skip: 1,
     info: &["speed"],
 };

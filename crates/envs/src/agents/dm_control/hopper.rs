@@ -13,7 +13,7 @@ use crate::agent::{Agent, Body, Facts, Obs, OptionInfo, OptionSet, Options, Sens
 
 const DOMAIN: Domain = Domain {
     file: "hopper.xml",
-    text: include_str!("../../../../../assets/dm_control/hopper.xml"),
+    text: marathon_assets::text("dm_control/hopper.xml"),
     frame_skip: 4,
     info: &["height", "speed"],
 };

@@ -17,7 +17,7 @@ use crate::agent::{
 
 const DOMAIN: Domain = Domain {
     file: "humanoid.xml",
-    text: include_str!("../../../../../assets/dm_control/humanoid.xml"),
+    text: marathon_assets::text("dm_control/humanoid.xml"),
     frame_skip: 5,
     info: &["head_height", "upright", "speed"],
 };

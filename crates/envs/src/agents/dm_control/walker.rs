@@ -13,7 +13,7 @@ use crate::agent::{Agent, Body, Facts, Obs, OptionInfo, OptionSet, Options, Sens
 
 const DOMAIN: Domain = Domain {
     file: "walker.xml",
-    text: include_str!("../../../../../assets/dm_control/walker.xml"),
+    text: marathon_assets::text("dm_control/walker.xml"),
     frame_skip: 10,
     info: &["height", "upright", "speed"],
 };

@@ -44,15 +44,15 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
 
 /// The models that ship with Gymnasium, by their names in `xml_file`.
 const MODELS: [(&str, &str); 9] = [
-    ("hopper.xml", include_str!("../../../../../assets/gymnasium/hopper.xml")),
-    ("walker2d_v5.xml", include_str!("../../../../../assets/gymnasium/walker2d.xml")),
-    ("half_cheetah.xml", include_str!("../../../../../assets/gymnasium/half_cheetah.xml")),
-    ("ant.xml", include_str!("../../../../../assets/gymnasium/ant.xml")),
-    ("humanoid.xml", include_str!("../../../../../assets/gymnasium/humanoid.xml")),
-    ("humanoidstandup.xml", include_str!("../../../../../assets/gymnasium/humanoidstandup.xml")),
-    ("swimmer.xml", include_str!("../../../../../assets/gymnasium/swimmer.xml")),
-    ("inverted_pendulum.xml", include_str!("../../../../../assets/gymnasium/inverted_pendulum.xml")),
-    ("inverted_double_pendulum.xml", include_str!("../../../../../assets/gymnasium/inverted_double_pendulum.xml")),
+    ("hopper.xml", marathon_assets::text("gymnasium/hopper.xml")),
+    ("walker2d_v5.xml", marathon_assets::text("gymnasium/walker2d.xml")),
+    ("half_cheetah.xml", marathon_assets::text("gymnasium/half_cheetah.xml")),
+    ("ant.xml", marathon_assets::text("gymnasium/ant.xml")),
+    ("humanoid.xml", marathon_assets::text("gymnasium/humanoid.xml")),
+    ("humanoidstandup.xml", marathon_assets::text("gymnasium/humanoidstandup.xml")),
+    ("swimmer.xml", marathon_assets::text("gymnasium/swimmer.xml")),
+    ("inverted_pendulum.xml", marathon_assets::text("gymnasium/inverted_pendulum.xml")),
+    ("inverted_double_pendulum.xml", marathon_assets::text("gymnasium/inverted_double_pendulum.xml")),
 ];
 
 /// Facts that the tasks share.

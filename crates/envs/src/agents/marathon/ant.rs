@@ -19,7 +19,7 @@ use marathon_physics::lanes::Real;
 use super::FASTEST;
 use crate::agent::{Agent, Facts, Motors, Obs, Part, Senses, Terms, names};
 
-const MODEL: &str = include_str!("../../../../../assets/agents/ant.xml");
+const MODEL: &str = marathon_assets::text("agents/ant.xml");
 
 /// Physics steps per decision: 500 Hz physics, 100 Hz control.
 const FRAME_SKIP: usize = 5;

@@ -19,7 +19,7 @@ use super::FASTEST;
 use crate::agent::senses::unit;
 use crate::agent::{Agent, Facts, Motors, Obs, Part, Senses, Terms, names};
 
-const MODEL: &str = include_str!("../../../../../assets/agents/hopper.xml");
+const MODEL: &str = marathon_assets::text("agents/hopper.xml");
 
 /// Physics steps per decision: 200 Hz physics, 50 Hz control.
 const FRAME_SKIP: usize = 4;

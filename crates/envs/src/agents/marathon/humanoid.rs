@@ -23,7 +23,7 @@ use crate::agent::memory::{PhaseBonus, Stride};
 use crate::agent::senses::unit;
 use crate::agent::{Agent, Facts, Motors, Obs, Part, Senses, Terms, names};
 
-const MODEL: &str = include_str!("../../../../../assets/agents/humanoid.xml");
+const MODEL: &str = marathon_assets::text("agents/humanoid.xml");
 
 /// Physics steps per decision: 200 Hz physics, 40 Hz control.
 const FRAME_SKIP: usize = 5;

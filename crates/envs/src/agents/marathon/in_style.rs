@@ -134,7 +134,7 @@ pub struct InStyle {
 macro_rules! clip {
     ($name:ident, $file:literal) => {
         static $name: LazyLock<Arc<Clip>> = LazyLock::new(|| {
-            let text = include_str!(concat!("../../../../../assets/motions/", $file));
+            let text = const { marathon_assets::text(concat!("motions/", $file)) };
             Arc::new(Clip::parse(Path::new($file), text.as_bytes()).unwrap_or_else(|error| panic!("{error}")))
         });
     };

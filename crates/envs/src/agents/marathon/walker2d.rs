@@ -19,7 +19,7 @@ use super::FASTEST;
 use crate::agent::senses::unit;
 use crate::agent::{Agent, Facts, Motors, Obs, Part, Senses, Terms, names};
 
-const MODEL: &str = include_str!("../../../../../assets/agents/walker2d.xml");
+const MODEL: &str = marathon_assets::text("agents/walker2d.xml");
 
 /// Physics steps per decision: 400 Hz physics, 100 Hz control.
 const FRAME_SKIP: usize = 4;

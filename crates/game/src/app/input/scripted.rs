@@ -1,4 +1,4 @@
-//! Scripted input: actions and held controls at given times, for films that can be made again.
+//! Scripted input: actions and held controls at given times, for videos that can be made again.
 //!
 //! A held control sends what the driver of a device would send, so that it passes Bevy's input, the bindings and the mappings.
 

@@ -10,20 +10,20 @@ use std::sync::Arc;
 
 /// Policies that come with the game.
 const FILES: [&[u8]; 14] = [
-    include_bytes!("../../../../../assets/policies/hopper.safetensors"),
-    include_bytes!("../../../../../assets/policies/walker2d.safetensors"),
-    include_bytes!("../../../../../assets/policies/humanoid.safetensors"),
-    include_bytes!("../../../../../assets/policies/ant.safetensors"),
-    include_bytes!("../../../../../assets/policies/MarathonManWalk.safetensors"),
-    include_bytes!("../../../../../assets/policies/MarathonManRun.safetensors"),
-    include_bytes!("../../../../../assets/policies/MarathonManBackflip.safetensors"),
-    include_bytes!("../../../../../assets/policies/MarathonManSteer.safetensors"),
-    include_bytes!("../../../../../assets/policies/AntController.safetensors"),
-    include_bytes!("../../../../../assets/policies/TerrainWalker2d.safetensors"),
-    include_bytes!("../../../../../assets/policies/HopperController.safetensors"),
-    include_bytes!("../../../../../assets/policies/WalkerController.safetensors"),
-    include_bytes!("../../../../../assets/policies/MarathonManController.safetensors"),
-    include_bytes!("../../../../../assets/policies/TerrainMarathonMan.safetensors"),
+    marathon_policies::bytes("hopper.safetensors"),
+    marathon_policies::bytes("walker2d.safetensors"),
+    marathon_policies::bytes("humanoid.safetensors"),
+    marathon_policies::bytes("ant.safetensors"),
+    marathon_policies::bytes("MarathonManWalk.safetensors"),
+    marathon_policies::bytes("MarathonManRun.safetensors"),
+    marathon_policies::bytes("MarathonManBackflip.safetensors"),
+    marathon_policies::bytes("MarathonManSteer.safetensors"),
+    marathon_policies::bytes("AntController.safetensors"),
+    marathon_policies::bytes("TerrainWalker2d.safetensors"),
+    marathon_policies::bytes("HopperController.safetensors"),
+    marathon_policies::bytes("WalkerController.safetensors"),
+    marathon_policies::bytes("MarathonManController.safetensors"),
+    marathon_policies::bytes("TerrainMarathonMan.safetensors"),
 ];
 
 /// The policies that come with the game, decoded once.

@@ -15,7 +15,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// The skin that comes with Marathon, and its name.
-const SHIPPED: (&str, &[u8]) = ("marathon_man", include_bytes!("../../../../../assets/skins/marathon_man.glb"));
+const SHIPPED: (&str, &[u8]) = ("marathon_man", marathon_assets::bytes("skins/marathon_man.glb"));
 /// Path of its bytes among the program's own assets.
 const PLACE: &str = "skin.glb";
 /// The first bytes of a .glb file.

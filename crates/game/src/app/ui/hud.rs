@@ -3,7 +3,7 @@
 use crate::app::input::actions::{Action, ActionPressed};
 use crate::app::mode::AppSet;
 use crate::app::notifications::{Notification, Notifications};
-use crate::app::pacing::Filmed;
+use crate::app::pacing::IsVideo;
 use crate::app::ui::theme::{BAD, Hud, TEXT, UiSet, card, text};
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, Area, Id, Ui};
@@ -23,14 +23,14 @@ fn switch(mut actions: MessageReader<ActionPressed>, mut hud: ResMut<Hud>) {
     }
 }
 
-/// Draws the messages. Without text and bars, only errors are shown; the console shows those of a film.
+/// Draws the messages. Without text and bars, only errors are shown; the console shows those of a video.
 pub fn draw(
     mut contexts: EguiContexts,
     hud: Res<Hud>,
     notes: Res<Notifications>,
-    filmed: Option<Res<Filmed>>,
+    recorded: Option<Res<IsVideo>>,
 ) -> Result {
-    if hud.on || filmed.is_none() {
+    if hud.on || recorded.is_none() {
         show(contexts.ctx_mut()?, &notes, hud.on);
     }
     Ok(())

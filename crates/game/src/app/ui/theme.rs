@@ -64,7 +64,7 @@ fn style(mut contexts: EguiContexts, mut done: Local<bool>) -> Result {
     ctx.set_visuals(egui::Visuals::dark());
     ctx.global_style_mut(|style| {
         style.interaction.selectable_labels = false;
-        // the first picture of a film shows whole windows
+        // the first picture of a video shows whole windows
         style.animation_time = 0.0;
         style.visuals.window_corner_radius = CornerRadius::same(10);
         style.visuals.override_text_color = Some(Color32::from_rgb(236, 240, 244));

@@ -11,7 +11,7 @@ use crate::agent::options::Choice;
 use crate::agent::{ModelSource, Part};
 
 /// The model with motors.
-const MODEL: &str = include_str!("../../../../../../assets/agents/marathon_man.xml");
+const MODEL: &str = marathon_assets::text("agents/marathon_man.xml");
 
 /// The tracked parts, in the original's order.
 pub const PARTS: [&str; 17] = [

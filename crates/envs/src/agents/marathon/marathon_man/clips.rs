@@ -19,7 +19,7 @@ macro_rules! shipped {
         [$(Shipped {
             name: $name,
             clip: LazyLock::new(|| {
-                let text = include_str!(concat!("../../../../../../assets/motions/marathon_man/", $name, ".motion"));
+                let text = const { marathon_assets::text(concat!("motions/marathon_man/", $name, ".motion")) };
                 let clip = Clip::parse(Path::new(concat!($name, ".motion")), text.as_bytes());
                 Arc::new(clip.unwrap_or_else(|error| panic!("{error}")))
             }),

@@ -142,8 +142,8 @@ fn finish(recorder: &Recorder, why: &str, notes: &mut Notifications) {
     }
     match keep(&recorder.recording) {
         Ok(path) => {
-            let (path, film) = (path.display().to_string(), path.with_extension("mp4").display().to_string());
-            notes.say(format!("{why}saved as {path}; a film of it: marathon-game --replay {path} --record {film}"));
+            let (path, video) = (path.display().to_string(), path.with_extension("mp4").display().to_string());
+            notes.say(format!("{why}saved as {path}; a video of it: marathon-game --replay {path} --record {video}"));
         }
         Err(error) => notes.error(format!("{why}the recording cannot be saved: {error}")),
     }

@@ -8,7 +8,7 @@ use crate::app::input::actions::{Action, ActionPressed};
 use crate::app::input::control::ControlSet;
 use crate::app::mode::{AppSet, Mode};
 use crate::app::notifications::Notifications;
-use crate::app::pacing::Filmed;
+use crate::app::pacing::IsVideo;
 use crate::app::stage::loaded::LoadedPolicy;
 use crate::app::stage::policies::ShippedPolicies;
 use crate::app::stage::scenario::{LoadScenario, PolicySource, Scenario};
@@ -31,7 +31,7 @@ pub(super) fn plugin(app: &mut App) {
         .add_systems(Update, (discard, control).chain().in_set(AppSet::Input).after(ControlSet))
         .add_systems(
             Update,
-            (sync_run.run_if(in_state(Mode::Learn)), keep_pace.run_if(resource_exists::<Filmed>), apply_policy, log)
+            (sync_run.run_if(in_state(Mode::Learn)), keep_pace.run_if(resource_exists::<IsVideo>), apply_policy, log)
                 .chain()
                 .in_set(AppSet::Simulate)
                 .after(spawn),

@@ -326,7 +326,7 @@ mod tests {
             sample()?.save(&path)?;
             std::fs::read(&path)?
         };
-        let policy = include_bytes!("../../../../../../assets/policies/hopper.safetensors");
+        let policy = marathon_policies::bytes("hopper.safetensors");
         for bytes in [&b""[..], b"{}", &whole[..whole.len() / 2], policy] {
             std::fs::write(&path, bytes)?;
             let error = Recording::load(&path).map(|_| ()).expect_err("it is no recording").to_string();

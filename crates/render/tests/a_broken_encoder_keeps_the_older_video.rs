@@ -1,5 +1,5 @@
-//! A film that cannot be written completely is an error, and the older film of that name stays. Causes are a full disk,
-//! or an encoder that reports success but writes no valid film.
+//! A video that cannot be written completely is an error, and the older video of that name stays. Causes are a full disk,
+//! or an encoder that reports success but writes no valid video.
 
 mod common;
 
@@ -51,12 +51,12 @@ fn an_encoder_that_reports_success_is_not_believed() {
         ("rm \"$last\"; echo 'No space left on device' >&2", "No space left on device"),
     ] {
         let folder = Folder::new("success");
-        std::fs::write(folder.path("run.mp4"), "older film").unwrap();
+        std::fs::write(folder.path("run.mp4"), "older video").unwrap();
         let mut writer = Mp4Writer::with_program(folder.path("run.mp4"), 25.0, &stand_in(&folder, body)).unwrap();
         writer.push(&noise(0)).unwrap();
         let error = writer.finish().unwrap_err().to_string();
         assert!(error.contains("run.mp4") && error.contains(problem), "{body}: {error}");
-        assert_eq!(std::fs::read(folder.path("run.mp4")).unwrap(), b"older film");
+        assert_eq!(std::fs::read(folder.path("run.mp4")).unwrap(), b"older video");
         assert_eq!(folder.names(), ["encoder.sh", "run.mp4"]);
     }
 }
@@ -89,7 +89,7 @@ impl Drop for Disk {
 #[test]
 fn a_full_disk_is_an_error_and_keeps_the_older_file() {
     let folder = Folder::new("full-disk");
-    // films smaller than the encoder's buffers fail only at the end
+    // videos smaller than the encoder's buffers fail only at the end
     let disk = match Disk::new(&folder, 64) {
         Ok(disk) => disk,
         Err(reason) => return println!("skipped: no file system can be mounted here: {reason}"),
@@ -102,15 +102,15 @@ fn a_full_disk_is_an_error_and_keeps_the_older_file() {
         }
         let path = disk.0.join(name);
         // only 8 kB are free
-        std::fs::write(&path, "older film").unwrap();
+        std::fs::write(&path, "older video").unwrap();
         std::fs::write(disk.0.join("others"), vec![1; 52 * 1024]).unwrap();
         let error = record(&path, frames).unwrap_err().to_string();
         assert!(error.contains(name) && error.contains("o space left on device"), "{name}, {frames} frames: {error}");
-        assert_eq!(std::fs::read(&path).unwrap(), b"older film", "{name}, {frames} frames");
+        assert_eq!(std::fs::read(&path).unwrap(), b"older video", "{name}, {frames} frames");
         let names: Vec<_> = std::fs::read_dir(&disk.0).unwrap().map(|entry| entry.unwrap().file_name()).collect();
         assert_eq!(names.len(), 2, "{name}, {frames} frames: {names:?}");
 
-        // with free space, the same film is written
+        // with free space, the same video is written
         std::fs::remove_file(disk.0.join("others")).unwrap();
         std::fs::remove_file(&path).unwrap();
         record(&folder.path(name), frames).unwrap();

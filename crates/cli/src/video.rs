@@ -1,4 +1,4 @@
-//! Films of a policy. Agents keep playing after a fall, so that you see it, and the clip that they follow is their
+//! Videos of a policy. Agents keep playing after a fall, so that you see it, and the clip that they follow is their
 //! ghost.
 
 use crate::error::CliError;
@@ -38,11 +38,11 @@ pub struct Shot {
     pub length: f64,
     /// Frames of a strip.
     pub frames: usize,
-    /// Frames per second of a film.
+    /// Frames per second of a video.
     pub fps: f64,
 }
 
-/// The agents of a film.
+/// The agents of a video.
 pub struct Cast {
     pub agents: usize,
     /// Seed of the environments.
@@ -53,7 +53,7 @@ pub struct Cast {
     pub ghost: Option<Ghost>,
 }
 
-/// Properties of the film.
+/// Properties of the video.
 #[derive(Serialize)]
 pub struct Report {
     #[serde(serialize_with = "text::path_json")]
@@ -108,7 +108,7 @@ impl Shot {
     }
 }
 
-/// Plays the policies of all roles with their best actions and films them.
+/// Plays the policies of all roles with their best actions and records them.
 ///
 /// # Errors
 /// If a ghost is requested but the agents follow no clip, or the picture cannot be written.
