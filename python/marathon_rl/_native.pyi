@@ -447,6 +447,7 @@ def train(
     config: str | PathLike[str] | dict[str, Any] | None = None,
     *,
     callback: Callable[[dict[str, float | None]], bool | None] | None = None,
+    progress: bool = True,
     seed: int | None = None,
     steps: int | None = None,
     num_envs: int | None = None,
@@ -469,6 +470,7 @@ def train(
             for what it leaves out. A file of ML-Agents, or a dictionary like one, is imported.
         callback: called after every iteration with the numbers that ``progress.csv`` holds, such as ``steps``,
             ``return_mean`` (None if no episode ended), ``steps_per_second``; if it returns False, training stops.
+        progress: show how far the run is on standard error: a bar in a terminal, a line now and then elsewhere.
         seed: seed of everything random.
         steps: steps of all agents together.
         num_envs: number of agents, a multiple of 16.

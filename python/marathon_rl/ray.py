@@ -160,6 +160,7 @@ def train(
     *,
     workers: int | Workers = 2,
     callback: Callable[[dict[str, float | None]], bool | None] | None = None,
+    progress: bool = True,
     seed: int | None = None,
     steps: int | None = None,
     num_envs: int | None = None,
@@ -180,6 +181,7 @@ def train(
             what it leaves out.
         workers: number of workers, or prepared `Workers`, which are left open.
         callback: called after every iteration with its numbers, as in `marathon_rl.train`.
+        progress: show how far the run is, as in `marathon_rl.train`.
         seed: seed of everything random.
         steps: steps of all agents together.
         num_envs: number of agents, a multiple of 16. Many of them make up for the time that messages take.
@@ -197,6 +199,7 @@ def train(
             task,
             config,
             callback=callback,
+            progress=progress,
             seed=seed,
             steps=steps,
             num_envs=num_envs,

@@ -267,3 +267,13 @@ def test_a_run_may_start_from_a_policy(tmp_path: Path) -> None:
     assert again.evaluation["return_mean"] > 0.3 * first.evaluation["return_mean"]
     with pytest.raises(ValueError, match="initialize_from is for new runs"):
         train(resume=tmp_path / "first", initialize_from=tmp_path / "first")
+
+
+def test_progress_is_shown_unless_it_is_not_wanted(capfd: pytest.CaptureFixture[str]) -> None:
+    config = copy.deepcopy(FOREIGN)
+    config["behaviors"]["Hopper"]["summary_freq"] = 1024
+    train("Hopper-v0", config, seed=3, threads=2)
+    text = capfd.readouterr().err
+    assert "4,096 of 4,096 steps" in text, text
+    train("Hopper-v0", config, seed=3, threads=2, progress=False)
+    assert capfd.readouterr() == ("", "")

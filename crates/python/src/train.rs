@@ -82,13 +82,14 @@ impl TrainResult {
 /// of a configuration; the task is needed for a class alone. `initialize_from`: a policy to start from in place of random
 /// weights, a file or the folder of a run, whose hidden layers are no wider; it may observe less. `players`: an object that has
 /// the rollouts played elsewhere, as `marathon_rl.ray.Workers` does. `options`: options of the task; a class gets them as
-/// arguments of its constructor.
+/// arguments of its constructor. `progress`: show how far the run is on standard error, as a bar in a terminal and as lines
+/// elsewhere.
 ///
 /// Ctrl-C and exceptions of the callback end training after the iteration; with a folder, what was learned is there and
 /// `resume` goes on with it. The same seed gives the same policy, bit for bit, for any number of threads.
 #[pyfunction]
 #[pyo3(signature = (
-    task = None, config = None, *, callback = None, seed = None, steps = None, num_envs = None, threads = None,
+    task = None, config = None, *, callback = None, progress = true, seed = None, steps = None, num_envs = None, threads = None,
     out = None, resume = None, players = None, initialize_from = None, **options
 ))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python function")]
@@ -97,6 +98,7 @@ pub fn train(
     task: Option<Task>,
     #[pyo3(from_py_with = self::config)] config: Option<Config>,
     callback: Option<Py<PyAny>>,
+    progress: bool,
     #[pyo3(from_py_with = number::seed)] seed: Option<u64>,
     #[pyo3(from_py_with = number::steps)] steps: Option<u64>,
     #[pyo3(from_py_with = number::num_envs)] num_envs: Option<usize>,
@@ -160,7 +162,7 @@ pub fn train(
     let mut last = (session.steps(), 0.0);
     let result = batch_task::run(py, made.batch_task.as_deref(), || {
         let players = players.as_mut().map(|players| players as &mut dyn Players);
-        session.carry_out_with(players, false, &mut |stats| {
+        session.carry_out_with(players, progress, &mut |stats| {
             let (steps, wall) = std::mem::replace(&mut last, (stats.steps, stats.wall_seconds));
             let rate = (stats.steps - steps) as f64 / (stats.wall_seconds - wall).max(1e-9);
             let ask = |py: Python<'_>| {
