@@ -3,7 +3,7 @@
 use crate::args::Options;
 use crate::error::StudyError;
 use crate::record::Record;
-use crate::statistics::{plus_minus, spread};
+use crate::statistics::{Spread, plus_minus, spread};
 use marathon_envs::{VecEnv, VecEnvOptions, registry};
 use marathon_render::{Follow, Renderer, Scene};
 use marathon_runs::report::chart::Chart;
@@ -61,12 +61,12 @@ pub fn run(options: &Options) -> Result<Record, StudyError> {
     })
 }
 
-fn measure(options: &Options, one: impl FnMut(u64) -> Result<f64, StudyError>) -> Result<(f64, f64), StudyError> {
+fn measure(options: &Options, one: impl FnMut(u64) -> Result<f64, StudyError>) -> Result<Spread, StudyError> {
     let speeds: Vec<f64> = (1..=options.seeds).map(one).collect::<Result<_, _>>()?;
     Ok(spread(speeds.iter().copied()))
 }
 
-fn row(agent: &str, pictures: &str, speed: (f64, f64), none: f64) -> Vec<String> {
+fn row(agent: &str, pictures: &str, speed: Spread, none: f64) -> Vec<String> {
     vec![agent.into(), pictures.into(), plus_minus(speed, 0), thousands((none / speed.0).round() as u64)]
 }
 

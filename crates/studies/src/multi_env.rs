@@ -3,7 +3,7 @@
 use crate::args::Options;
 use crate::error::StudyError;
 use crate::record::Record;
-use crate::statistics::{plus_minus, spread};
+use crate::statistics::{Spread, plus_minus, spread};
 use crate::training::{Run, each_seed, train_on};
 use marathon_config as config;
 use marathon_envs::{VecEnv, VecEnvOptions, registry};
@@ -25,7 +25,7 @@ const DECISIONS: usize = 20_000;
 /// If that fails.
 pub fn run(options: &Options) -> Result<Record, StudyError> {
     let (mut rows, mut bars) = (Vec::new(), Vec::new());
-    let mut add = |way: &str, agents: usize, learns: &str, speeds: (f64, f64), eval: String| {
+    let mut add = |way: &str, agents: usize, learns: &str, speeds: Spread, eval: String| {
         rows.push(vec![
             way.to_string(),
             agents.to_string(),

@@ -62,7 +62,7 @@ impl Record {
         text += &format!(
             "\n![{}]({}.png)\n\n```text\ncargo run --release -p marathon-studies -- {} --seeds {seeds}{steps} --threads {threads}{}\n```\n\n\
              Marathon {}, {}, {} thread{}, instruction set {}{}. Seconds are processor time of all threads unless said \
-             otherwise.\n",
+             otherwise. ± is the standard deviation over the seeds.\n",
             self.title,
             self.name,
             self.name,

@@ -1,15 +1,21 @@
 //! Numbers of several seeds, and cells of a table.
 
+/// Mean and standard deviation. A single number has no deviation.
+pub type Spread = (f64, Option<f64>);
+
 /// Mean and standard deviation, of the population.
-pub fn spread(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
-    let n = values.clone().count().max(1) as f64;
+pub fn spread(values: impl Iterator<Item = f64> + Clone) -> Spread {
+    let count = values.clone().count();
+    let n = count.max(1) as f64;
     let mean = values.clone().sum::<f64>() / n;
-    (mean, (values.map(|x| (x - mean) * (x - mean)).sum::<f64>() / n).sqrt())
+    let deviation = (values.map(|x| (x - mean) * (x - mean)).sum::<f64>() / n).sqrt();
+    (mean, (count > 1).then_some(deviation))
 }
 
 /// `mean ± deviation`.
-pub fn plus_minus((mean, deviation): (f64, f64), decimals: usize) -> String {
-    format!("{mean:.decimals$} ± {deviation:.decimals$}")
+pub fn plus_minus((mean, deviation): Spread, decimals: usize) -> String {
+    let deviation = deviation.map_or(String::new(), |deviation| format!(" ± {deviation:.decimals$}"));
+    format!("{mean:.decimals$}{deviation}")
 }
 
 /// The median: the mean of the two middle numbers if their count is even. `None` without numbers.
@@ -36,8 +42,9 @@ mod tests {
 
     #[test]
     fn spreads_are_of_the_population() {
-        assert_eq!(spread([1.0, 3.0].into_iter()), (2.0, 1.0));
-        assert_eq!(plus_minus((2.0, 1.04), 1), "2.0 ± 1.0");
+        assert_eq!(spread([1.0, 3.0].into_iter()), (2.0, Some(1.0)));
+        assert_eq!(plus_minus((2.0, Some(1.04)), 1), "2.0 ± 1.0");
+        assert_eq!(plus_minus(spread([2.5].into_iter()), 1), "2.5");
     }
 
     #[test]

@@ -31,17 +31,24 @@ pub fn of_clip(path: &Path, clip: &Clip, asked: Option<&str>) -> Result<Model, C
     Ok(model)
 }
 
-/// The model of the first agent with the joints and the model name of the clip.
+/// The model of the first agent with the joints and the model name of the clip. Those on flat ground go first: terrain takes
+/// long to draw.
 fn named(path: &Path, clip: &Clip) -> Result<Model, CliError> {
     let name = &clip.about().model;
+    let mut on_terrain = None;
     for id in registry::ids() {
         let model = registry::agent(&id)?.model()?;
         if model.name == *name && clip.check_model(path, &model).is_ok() {
-            return Ok(model);
+            if model.hfields.is_empty() {
+                return Ok(model);
+            }
+            on_terrain.get_or_insert(model);
         }
     }
-    let text = format!("{} is for the model {name:?}, which no agent has; pass --model", path_word(path));
-    Err(CliError::Usage(text))
+    on_terrain.ok_or_else(|| {
+        let text = format!("{} is for the model {name:?}, which no agent has; pass --model", path_word(path));
+        CliError::Usage(text)
+    })
 }
 
 /// Reads a clip: a file, or one of Marathon's clips by its name.
@@ -66,4 +73,18 @@ pub fn clip(path: &Path) -> Result<Clip, CliError> {
     }
     let bytes = budget::read(path, &CLIP_FILE).map_err(CliError::io(path, "read"))?;
     Ok(Clip::parse(path, &bytes)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_model_of_a_clip_stands_on_flat_ground() -> Result<(), CliError> {
+        let path = Path::new("walk");
+        let model = of_clip(path, &clip(path)?, None)?;
+        assert_eq!(model.name, "marathon_man");
+        assert!(model.hfields.is_empty());
+        Ok(())
+    }
 }
