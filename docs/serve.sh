@@ -21,7 +21,7 @@ if [ "$action" = serve ]; then
 fi
 "$mdbook" build docs 2>&1 | tee target/mdbook/log
 # mdBook copies all files of the folder
-rm -rf target/book/{book.toml,*.py,*.sh,generator,__pycache__,images/draw.sh}
+rm -rf target/book/{book.toml,*.py,*.sh,generator,__pycache__}
 if grep -q '^ *WARN' target/mdbook/log; then
   echo 'mdBook warns of pages that it cannot show as they are' >&2
   exit 1

@@ -1,6 +1,6 @@
 //! The README's first command gives the shipped policy: `train hopper`, with the default seed, gives the weights of
-//! `assets/policies/hopper.safetensors`, bit for bit. After a change of bits, `assets/policies/train.sh` trains the
-//! shipped policies again.
+//! `assets/policies/hopper.safetensors`, bit for bit. After a change of bits, `marathon-studies reproduce
+//! --update` trains the shipped policies again.
 
 mod common;
 
@@ -16,7 +16,11 @@ fn training_gives_the_shipped_weights() {
     let [trained, shipped] = [run.join("policy.safetensors"), shipped].map(|file| tensors(&file));
     for (t, s) in trained.iter().zip(&shipped) {
         assert_eq!((&t.0, &t.1), (&s.0, &s.1));
-        assert!(t.2 == s.2, "{} has other bits: run assets/policies/train.sh if they are meant to change", t.0);
+        assert!(
+            t.2 == s.2,
+            "{} has other bits: run `marathon-studies reproduce hopper --update` if they are meant to change",
+            t.0
+        );
     }
     assert_eq!(trained.len(), shipped.len());
     // the numbers in the README

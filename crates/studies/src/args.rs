@@ -23,6 +23,9 @@ pub struct Args {
 pub enum Command {
     #[command(flatten)]
     Study(Study),
+    /// Make the shipped policies, their images and the tables of the studies again, and report what changed. All of it
+    /// takes days of processor time; results are kept, and the same command continues.
+    Reproduce(ReproduceOptions),
     /// Play rollouts for `multi-env`, which starts this.
     #[command(hide = true)]
     RolloutWorker,
@@ -151,6 +154,23 @@ impl Options {
         AtomicFile::create(&there.join("study"))?;
         Ok(())
     }
+}
+
+/// Options of `reproduce`.
+#[derive(Debug, clap::Args)]
+pub struct ReproduceOptions {
+    /// Policies and studies, by name [default: all].
+    #[arg(value_name = "NAME")]
+    pub names: Vec<String>,
+    /// Print the commands, and run nothing.
+    #[arg(long)]
+    pub list: bool,
+    /// Folder for runs, results and report.md.
+    #[arg(long, value_name = "DIR", default_value = "runs/reproduce")]
+    pub keep: PathBuf,
+    /// Replace the files of the repository that changed.
+    #[arg(long)]
+    pub update: bool,
 }
 
 /// Options for the trainers of other projects.

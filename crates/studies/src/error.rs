@@ -19,6 +19,9 @@ pub enum StudyError {
     /// A Python process does not start or answer.
     #[error("{0}")]
     Python(String),
+    /// A command of a recipe failed.
+    #[error("{0}")]
+    Recipe(String),
     /// The command line is wrong.
     #[error("{0}")]
     Usage(String),

@@ -12,6 +12,7 @@ mod kept;
 mod multi_env;
 mod peers;
 mod record;
+mod reproduce;
 mod statistics;
 mod style_transfer;
 mod table1;
@@ -45,6 +46,7 @@ fn main() -> ExitCode {
 fn run(args: &Args) -> Result<(), StudyError> {
     let study = match &args.command {
         Command::Study(study) => study,
+        Command::Reproduce(options) => return reproduce::run(options, args.json),
         Command::RolloutWorker => {
             // the learner handles Ctrl-C and finishes its iteration
             interrupt::listen(|| {})?;

@@ -154,3 +154,53 @@ fn the_output_folder_is_checked_before_the_work() {
     assert!(error.contains("--out is file/pages, but file is a file; expected a folder"), "{error}");
     assert!(begun.elapsed() < Duration::from_secs(60), "no work is done");
 }
+
+/// A folder of `reproduce` in which the hopper is done: the results are those of the repository, with `policy` as the policy.
+fn done(folder: &Path, policy: &str) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let place = folder.join("hopper");
+    std::fs::create_dir_all(place.join("done")).unwrap();
+    std::fs::create_dir_all(place.join("run")).unwrap();
+    let copy = |from: &str, to: &str| std::fs::copy(root.join(from), place.join(to)).unwrap();
+    copy(&format!("assets/policies/{policy}.safetensors"), "run/policy.safetensors");
+    copy("docs/images/hopper-gait.png", "hopper-gait.png");
+    copy("docs/images/hopper-curve.png", "hopper-curve.png");
+    let plan = succeed(&root, &["reproduce", "--list", "hopper"]);
+    for (number, command) in plan.lines().skip(1).enumerate() {
+        std::fs::write(place.join(format!("done/{number:02}")), command.trim()).unwrap();
+    }
+}
+
+#[test]
+fn a_reproduction_names_what_changed() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let folder = tempfile::tempdir().unwrap();
+    let keep = folder.path().to_string_lossy().into_owned();
+    done(folder.path(), "hopper");
+    let text = succeed(&root, &["reproduce", "hopper", "--keep", &keep]);
+    assert_eq!(text.matches("| same |").count(), 3, "{text}");
+    assert_eq!(std::fs::read_to_string(folder.path().join("report.md")).unwrap(), text);
+    done(folder.path(), "walker2d");
+    let text = succeed(&root, &["reproduce", "hopper", "--keep", &keep]);
+    let expected =
+        "| hopper | assets/policies/hopper.safetensors | changed | return 1692.3 ± 6.0, 0 falls, before: return 833.1";
+    assert!(text.contains(expected), "{text}");
+    assert_eq!(text.matches("| same |").count(), 2, "{text}");
+    // a command that fails
+    std::fs::remove_file(folder.path().join("hopper/done/01")).unwrap();
+    std::fs::write(folder.path().join("hopper/run/policy.safetensors"), "no policy").unwrap();
+    let output = studies(&root, &["reproduce", "hopper", "--keep", &keep]).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("| hopper |  | failed | `"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("1 of 1 could not be reproduced"), "{}", stderr(&output));
+}
+
+#[test]
+fn reproductions_start_in_the_repository() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = fail(folder.path(), 2, &["reproduce", "hopper"]);
+    assert!(text.contains("runs in a clone of the repository"), "{text}");
+    assert!(std::fs::read_dir(folder.path()).unwrap().next().is_none(), "nothing is written");
+    let text = fail(folder.path(), 2, &["reproduce", "hoper"]);
+    assert!(text.contains("did you mean hopper?"), "{text}");
+}
