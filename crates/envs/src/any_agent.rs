@@ -150,7 +150,7 @@ impl<A: Agent> AnyAgent for A {
     }
 }
 
-/// What keeps tasks from running in these lanes, if anything. Double precision needs the feature `double`: it adds a sixth to
+/// The reason why tasks cannot run in these lanes; `None` if they can. Double precision needs the feature `double`: it adds a sixth to
 /// the time that a program takes to compile, and only comparisons with other engines use it.
 pub fn obstacle(isa: Isa) -> Option<&'static str> {
     match isa {

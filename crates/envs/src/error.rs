@@ -98,7 +98,7 @@ pub enum EnvError {
     Isa {
         /// The requested instruction set.
         isa: &'static str,
-        /// What is missing.
+        /// The reason.
         obstacle: &'static str,
         /// The best available one.
         best: &'static str,

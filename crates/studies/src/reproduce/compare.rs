@@ -15,7 +15,7 @@ const LISTED: usize = 6;
 pub enum Change {
     /// Nothing changed.
     None,
-    /// What changed.
+    /// A description of the differences.
     Some(String),
 }
 

@@ -26,11 +26,11 @@ const INTERRUPTED: i32 = 130;
 struct Row {
     /// Recipe.
     name: String,
-    /// What it made: a path in the repository.
+    /// Path of the result in the repository.
     product: String,
     /// `same`, `changed` or `failed`.
     result: &'static str,
-    /// What changed or failed.
+    /// Differences, or the error.
     details: String,
 }
 

@@ -20,7 +20,7 @@ pub struct Step {
     pub words: Vec<String>,
 }
 
-/// Who runs a command.
+/// A program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Program {
     /// The command `marathon`.
