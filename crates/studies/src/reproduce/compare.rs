@@ -1,4 +1,4 @@
-//! What a reproduction changed: policies, tables and images beside those of the repository.
+//! Comparison of reproduced policies, tables and images with those of the repository.
 
 use crate::error::StudyError;
 use marathon_learn::Policy;
