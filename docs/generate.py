@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Writes docs/reference/cli.md and docs/reference/python.md from the programs themselves.
+"""Writes docs/reference/cli.md, docs/reference/python.md and docs/images/speed.svg from their sources.
 
     docs/generate.py --program target/release/marathon            write the pages
     docs/generate.py --program target/release/marathon --check    fail if a page is out of date
 
-The page of the command line comes from `marathon --help`, that of Python from the types and docstrings of the package.
+The page of the command line comes from `marathon --help`, that of Python from the types and docstrings of the package,
+and the chart from the table of the README.
 """
 
 import argparse
@@ -12,7 +13,7 @@ import sys
 from difflib import unified_diff
 from pathlib import Path
 
-from generator import cli_page, python_page
+from generator import cli_page, python_page, speed_chart
 
 DOCS = Path(__file__).resolve().parent
 
@@ -33,6 +34,7 @@ def main() -> None:
     pages = {
         DOCS / "reference/cli.md": cli_page.page(options.program),
         DOCS / "reference/python.md": python_page.page(DOCS.parent / "python/marathon_rl"),
+        DOCS / "images/speed.svg": speed_chart.svg(DOCS.parent / "README.md"),
     }
     if not options.check:
         for path, text in pages.items():
