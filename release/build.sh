@@ -186,7 +186,7 @@ game() {
   cargo build --release --locked --target "$platform" --package marathon-game --bin marathon-game --features baseline
   while IFS= read -r file; do
     files+=("$file=$file")
-  done < <(git ls-files assets)
+  done < <(git ls-files assets ':!*.rs' ':!*Cargo.toml')
   archive marathon-game "$platform" marathon-game crates/game/README.md=README.md \
     "$CARGO_TARGET_DIR/$platform/release/marathon-game$exe=marathon-game$exe" "${files[@]}"
   "$python" release/check.py ${forbid[@]+"${forbid[@]}"} "${made[0]}"
