@@ -3,11 +3,12 @@
 and corpus/files-0 to -7.
 
 The fuzzer rarely finds a whole file of a format by itself, but it can change one. The script needs no packages. Networks,
-demonstrations, tables and descriptions need the program in target/release.
+demonstrations, tables and descriptions need the program, in target/release or CARGO_TARGET_DIR.
 """
 
 import json
 import math
+import os
 import re
 import struct
 import subprocess
@@ -17,7 +18,7 @@ from pathlib import Path
 HERE = Path(__file__).parent
 MOTIONS = HERE.parent / "assets/motions"
 POLICIES = HERE.parent / "assets/policies"
-PROGRAM = HERE.parent / "target/release/marathon"
+PROGRAM = Path(os.environ.get("CARGO_TARGET_DIR", HERE.parent / "target")) / "release/marathon"
 
 
 def clips():
