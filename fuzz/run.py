@@ -4,8 +4,8 @@
     fuzz/run.py [--seconds 600] [TARGET ...]
 
 Targets are `mjcf`, `batch`, `mlagents`, and the readers `motion-0` to `motion-4` and `files-0` to `files-7`. New inputs
-go to corpus/TARGET, inputs that fail to artifacts/TARGET-..., and an interrupted run continues from the corpus. Prints a
-row per target; the exit code is 1 if one failed. Needs a C++ compiler.
+go to corpus/TARGET, inputs that fail to artifacts/TARGET-..., and an interrupted run continues from the corpus. Prints
+a row per target; the exit code is 1 if one failed. Needs a C++ compiler.
 """
 
 import argparse
