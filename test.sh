@@ -1,16 +1,18 @@
 #!/usr/bin/env bash
 # Tests everything but the game, the packing of the wheel, and whether the fuzzers and the core for browsers compile. `./test.sh
-# --all` tests those as well, and compiles Bevy once.
+# --all` tests those as well, and compiles Bevy once. `./test.sh --long` adds what takes hours: tests/long.sh lists it.
 #
 # Sets up by itself what the tests need: Python environments with the oracles (MuJoCo, Gymnasium, dm_control, PyTorch) in
 # .venv and with ML-Agents in .venv-mlagents; with --all and as root the Debian packages of the game. Needs a Rust toolchain
 # with clippy and rustfmt, Python 3.11 with venv, and a C compiler.
 set -euo pipefail
 cd "$(dirname "$0")"
+long=''
 case "${1:-}" in
   '') game='' ;;
   --all) game=yes ;;
-  *) echo "usage: ./test.sh [--all], found '$1'" >&2 && exit 2 ;;
+  --long) game=yes long=yes ;;
+  *) echo "usage: ./test.sh [--all | --long], found '$1'" >&2 && exit 2 ;;
 esac
 if [ -n "$game" ]; then
   crates/game/tests/packages.sh
@@ -39,3 +41,7 @@ cargo build --release "${packages[@]}" --all-targets
 cargo test --release "${packages[@]}"
 python/tests/run.sh
 tests/mlagents/run.sh
+if [ -n "$long" ]; then
+  unset RUSTC_WORKSPACE_WRAPPER
+  tests/long.sh
+fi

@@ -1,0 +1,29 @@
+#!/usr/bin/env bash
+# Checks that take hours; ./test.sh --long runs them after those of --all. tests/long.sh PART ... runs some:
+#
+#   fuzz      every reader for ten minutes of processor time (fuzz/run.py)
+#   release   wheels, programs and archives of all platforms that this system can build, tried as a user would
+#   aarch64   the Python tests with the wheel for Arm, under qemu
+#   crates    packs and compiles the published crates
+set -euo pipefail
+cd "$(dirname "$0")/.."
+parts=("$@")
+if [ $# = 0 ]; then
+  parts=(fuzz release aarch64 crates)
+fi
+for part in "${parts[@]}"; do
+  echo "tests/long.sh: $part" >&2
+  case "$part" in
+    fuzz) fuzz/run.py ;;
+    release)
+      release/build.sh
+      PLATFORM='x86_64-unknown-linux-musl x86_64-unknown-linux-gnu' release/smoke.sh release/dist
+      ;;
+    aarch64)
+      release/build.sh wheel-aarch64
+      tests/aarch64.sh release/dist/marathon_rl-*manylinux*aarch64*.whl
+      ;;
+    crates) release/publish.sh --dry-run ;;
+    *) echo "tests/long.sh: no part '$part'; there are fuzz, release, aarch64 and crates" >&2 && exit 2 ;;
+  esac
+done
