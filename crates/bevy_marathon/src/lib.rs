@@ -26,7 +26,8 @@
 //! }
 //! ```
 //!
-//! An agent that takes commands has an [`AgentCommand`]: `command.set("speed", 2.0)?` steers it.
+//! An agent that takes commands has an [`AgentCommand`]: `command.set("speed", 2.0)?` steers it. [`MoveDirection`] makes it walk
+//! in a direction of the world, such as that of a stick as the camera sees it.
 //!
 //! The simulation is that of `marathon train` and `marathon eval`: the same seed gives the same bits in both,
 //! at every frame rate.
@@ -51,6 +52,7 @@ pub mod asset;
 pub mod axes;
 mod characters;
 mod command;
+mod direction;
 mod error;
 mod ground;
 #[cfg(feature = "render")]
@@ -64,6 +66,7 @@ mod simulate;
 pub use asset::{PolicyAsset, RagdollPrefab};
 pub use characters::{PoseSample, spec_of_role};
 pub use command::AgentCommand;
+pub use direction::MoveDirection;
 pub use error::{CommandError, RagdollError};
 pub use ground::{Ground, TRACK_HALF_WIDTH};
 pub use marathon::{Marathon, RagdollState};
@@ -80,7 +83,8 @@ pub mod prelude {
     pub use crate::plugin::{MarathonPlugin, MarathonSystems};
     pub use crate::ragdoll::*;
     pub use crate::{
-        AgentCommand, CommandError, Ground, Marathon, PolicyAsset, RagdollError, RagdollPrefab, RagdollState,
+        AgentCommand, CommandError, Ground, Marathon, MoveDirection, PolicyAsset, RagdollError, RagdollPrefab,
+        RagdollState,
     };
     pub use marathon_physics::Variation;
     pub use marathon_runs::TaskConfig;

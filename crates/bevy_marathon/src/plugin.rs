@@ -2,6 +2,7 @@
 
 use crate::asset::{MjcfLoader, PolicyAsset, PolicyLoader, RagdollPrefab};
 use crate::command::AgentCommand;
+use crate::direction::{self, MoveDirection};
 use crate::marathon::Marathon;
 use crate::ragdoll::{
     CharacterPolicy, Controls, Episode, EpisodeBegan, EpisodeEnded, FootContact, Held, LaidGround, Opponent, OwnGround,
@@ -53,7 +54,9 @@ impl Plugin for MarathonPlugin {
             .add_systems(
                 FixedUpdate,
                 (
-                    (simulate::admit, simulate::take_in, simulate::push).chain().in_set(MarathonSystems::Admit),
+                    (simulate::admit, direction::follow, simulate::take_in, simulate::push)
+                        .chain()
+                        .in_set(MarathonSystems::Admit),
                     simulate::simulate.in_set(MarathonSystems::Simulate),
                     (simulate::report, simulate::face_targets).chain().in_set(MarathonSystems::Report),
                 ),
@@ -71,6 +74,7 @@ fn register_types(app: &mut App) {
         .register_type::<Controls>()
         .register_type::<Held>()
         .register_type::<AgentCommand>()
+        .register_type::<MoveDirection>()
         .register_type::<LaidGround>()
         .register_type::<Target>()
         .register_type::<Physique>()
