@@ -15,6 +15,14 @@ const EASE_TURN: f32 = 0.15;
 const FASTEST: f32 = 12.0;
 /// Radians per second of [`CameraMode::Orbit`].
 const ORBIT_SPEED: f32 = 0.25;
+/// Largest turn rate with which [`CameraMode::Chase`] gets behind its target, rad/s; it is that at a right angle.
+const CHASE_SPEED: f32 = 0.9;
+/// Speed from which on it turns that fast, m/s; at rest it does not turn.
+const CHASE_FROM: f32 = 1.0;
+/// Seconds for which it does not turn by itself after [`FollowCamera::turn`].
+const CHASE_PAUSE: f32 = 2.5;
+/// Cosine of the tilt up to which a target counts as upright.
+const UPRIGHT: f32 = 0.7;
 
 /// Moves [`FollowCamera`]s. The app decides what input turns them.
 #[derive(Clone, Copy, Debug, Default)]
@@ -37,7 +45,7 @@ pub enum CameraMode {
     /// Beside the runner, a little ahead.
     #[default]
     Side,
-    /// Behind it.
+    /// Behind it. It turns slowly to where the target faces while the target moves, but not around for one that comes towards it.
     Chase,
     /// Around it, slowly.
     Orbit,
@@ -70,7 +78,7 @@ impl CameraMode {
     fn yaw(self) -> Option<f32> {
         match self {
             CameraMode::Side => Some(-0.42),
-            CameraMode::Chase => Some(-FRAC_PI_2 + 0.12),
+            CameraMode::Chase => Some(-FRAC_PI_2),
             CameraMode::Orbit | CameraMode::Free => None,
         }
     }
@@ -100,6 +108,10 @@ pub struct FollowCamera {
     pub goal: [f32; 3],
     /// It has arrived somewhere before; the first time it jumps.
     settled: bool,
+    /// It is to get behind its target at once.
+    align: bool,
+    /// Seconds until it turns by itself again.
+    pause: f32,
 }
 
 impl Default for FollowCamera {
@@ -114,6 +126,8 @@ impl Default for FollowCamera {
             ahead: 0.0,
             goal: [-0.42, 0.2, 5.0],
             settled: false,
+            align: false,
+            pause: 0.0,
         }
     }
 }
@@ -124,9 +138,13 @@ impl FollowCamera {
         FollowCamera { target: Some(target), ..default() }
     }
 
-    /// Turns it about what it follows; it then no longer keeps to a side by itself.
+    /// Turns it about what it follows. [`CameraMode::Side`] then no longer keeps to its side, and [`CameraMode::Chase`] waits before
+    /// it turns by itself.
     pub fn turn(&mut self, yaw: f32, pitch: f32) {
-        self.mode = if self.mode == CameraMode::Orbit { CameraMode::Orbit } else { CameraMode::Free };
+        if self.mode == CameraMode::Side {
+            self.mode = CameraMode::Free;
+        }
+        self.pause = CHASE_PAUSE;
         self.goal[0] += yaw;
         self.goal[1] = (self.goal[1] + pitch).clamp(-0.05, 1.45);
     }
@@ -139,16 +157,36 @@ impl FollowCamera {
     /// Looks from where a mode looks.
     pub fn set_mode(&mut self, mode: CameraMode) {
         self.mode = mode;
+        (self.align, self.pause) = (mode == CameraMode::Chase, 0.0);
         if let Some(yaw) = mode.yaw() {
-            // the short way round
-            let turns = ((self.goal[0] - yaw) / (2.0 * PI)).round();
-            self.goal[0] = yaw + turns * 2.0 * PI;
+            self.face(yaw);
+        }
+    }
+
+    /// Turns to an angle, the short way round.
+    fn face(&mut self, yaw: f32) {
+        let turns = ((self.goal[0] - yaw) / (2.0 * PI)).round();
+        self.goal[0] = yaw + turns * 2.0 * PI;
+    }
+
+    /// Gets behind a target that faces an angle about the vertical, rad, and moves at a speed, m/s.
+    fn chase(&mut self, heading: f32, speed: f32, dt: f32) {
+        let yaw = heading - FRAC_PI_2;
+        if self.align {
+            self.align = false;
+            self.face(yaw);
+        }
+        self.pause = (self.pause - dt).max(0.0);
+        if self.pause == 0.0 {
+            // one that comes towards it is seen from the front
+            self.goal[0] += CHASE_SPEED * (yaw - self.goal[0]).sin() * (speed / CHASE_FROM).min(1.0) * dt;
         }
     }
 
     /// Makes the next frame jump to the target instead of moving there.
     pub fn jump(&mut self) {
         self.settled = false;
+        self.align = self.mode == CameraMode::Chase;
     }
 }
 
@@ -193,6 +231,13 @@ fn follow(
                 let focus = camera.focus;
                 camera.focus = focus + (to - focus) * Vec3::new(side, up, side);
                 camera.settled = true;
+                let facing = track.rotation * part.rotation;
+                // in a flip, or on the ground, a character faces nowhere
+                if camera.mode == CameraMode::Chase && (facing * Vec3::Y).y > UPRIGHT {
+                    let forward = facing * Vec3::X;
+                    let [ahead, left] = episode.map_or([0.0; 2], |e| e.own_velocity);
+                    camera.chase((-forward.z).atan2(forward.x), ahead.hypot(left) * pace, dt);
+                }
             }
         }
         if camera.mode == CameraMode::Orbit {
@@ -208,5 +253,48 @@ fn follow(
         let mut eye = camera.focus + turn * (Vec3::Z * camera.distance);
         eye.y = eye.y.max(0.08);
         *transform = Transform::from_translation(eye).looking_at(camera.focus, Vec3::Y);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A camera behind a runner along +x.
+    fn chasing() -> FollowCamera {
+        let mut camera = FollowCamera::default();
+        camera.set_mode(CameraMode::Chase);
+        camera.chase(0.0, 0.0, 0.0);
+        camera
+    }
+
+    #[test]
+    fn it_gets_behind_a_target_that_moves() {
+        let mut camera = chasing();
+        assert_eq!(camera.goal[0], -FRAC_PI_2);
+        // a quarter turn to the left, at rest
+        (0..600).for_each(|_| camera.chase(FRAC_PI_2, 0.0, 1.0 / 60.0));
+        assert_eq!(camera.goal[0], -FRAC_PI_2);
+        (0..600).for_each(|_| camera.chase(FRAC_PI_2, 2.0, 1.0 / 60.0));
+        assert!(camera.goal[0].abs() < 0.01, "{}", camera.goal[0]);
+    }
+
+    #[test]
+    fn it_does_not_turn_around_for_one_that_comes_towards_it() {
+        let mut camera = chasing();
+        (0..120).for_each(|_| camera.chase(PI, 2.0, 1.0 / 60.0));
+        assert!((camera.goal[0] + FRAC_PI_2).abs() < 0.01, "{}", camera.goal[0]);
+    }
+
+    #[test]
+    fn a_hand_on_the_camera_goes_before() {
+        let mut camera = chasing();
+        camera.turn(1.0, 0.0);
+        assert_eq!(camera.mode, CameraMode::Chase);
+        let held = camera.goal[0];
+        (0..120).for_each(|_| camera.chase(0.0, 2.0, 1.0 / 60.0));
+        assert_eq!(camera.goal[0], held);
+        (0..600).for_each(|_| camera.chase(0.0, 2.0, 1.0 / 60.0));
+        assert!((camera.goal[0] + FRAC_PI_2).abs() < 0.02, "{}", camera.goal[0]);
     }
 }

@@ -4,6 +4,7 @@ use crate::app::error::GameError;
 use crate::app::files::exists;
 use crate::app::input::response::{Mapping, Mappings};
 use crate::app::input::scripted::{ScriptedAction, ScriptedInput};
+use crate::app::input::steering::SteeringFrame;
 use crate::app::mode::Mode;
 use crate::app::pacing::FixedSettings;
 use crate::app::stage::clips::{FOLLOWER, follows_clip};
@@ -127,6 +128,9 @@ pub struct Args {
     /// Run the action of a key at a time, s, such as 2.5:throw or 4:next-agent; repeatable.
     #[arg(long, value_name = "S:ACTION")]
     pub action: Vec<ScriptedAction>,
+    /// Frame of the left stick and of the keys that steer, for a character that turns.
+    #[arg(long, value_enum, default_value_t)]
+    pub steering: SteeringFrame,
     /// Hold a key, or a stick, trigger or button of a gamepad, from one time to another, s, such as 1-2.5:key:up,
     /// 1-3:pad:left-y=0.5 or 2-2.2:pad2:a; repeatable.
     #[arg(long, value_name = "S-S:DEVICE:CONTROL")]
@@ -138,9 +142,9 @@ pub struct Args {
     /// Size of the window or the video, pixels [default: 1280x720].
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<(u32, u32)>,
-    /// Place of the camera.
-    #[arg(long, default_value = CAMERAS[0].0, value_parser = one_of(CAMERAS))]
-    pub camera: CameraMode,
+    /// Place of the camera [default: behind a character that turns, beside others].
+    #[arg(long, value_parser = one_of(CAMERAS))]
+    pub camera: Option<CameraMode>,
     /// Limit on the frames per second of the window; 0 for the rate of the screen.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub max_fps: u32,
@@ -390,9 +394,12 @@ mod tests {
     fn choices_are_read_by_their_names() {
         let read = |words: &[&str]| Args::try_parse_from([&["marathon-game"], words].concat());
         let args = read(&["--ground", "stairs", "--quality", "high", "--camera", "orbit"]).expect("they exist");
-        assert_eq!((args.ground, args.quality, args.camera), (Ground::Stairs, Some(Quality::High), CameraMode::Orbit));
+        assert_eq!(
+            (args.ground, args.quality, args.camera),
+            (Ground::Stairs, Some(Quality::High), Some(CameraMode::Orbit))
+        );
         let args = read(&[]).expect("there are defaults");
-        assert_eq!((args.ground, args.quality, args.camera), (Ground::Level, None, CameraMode::Side));
+        assert_eq!((args.ground, args.quality, args.camera), (Ground::Level, None, None));
         let error = read(&["--ground", "hils"]).expect_err("there is no such ground").to_string();
         assert!(
             error.contains("level, hills, stairs, boards") && error.contains("similar value exists: 'hills'"),

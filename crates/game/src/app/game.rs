@@ -5,7 +5,7 @@ use crate::app::error::GameError;
 use crate::app::features::course::{Runs, check_table};
 use crate::app::features::replay::play::Playback;
 use crate::app::features::training::{TrainingOptions, settings};
-use crate::app::input::camera::FirstCamera;
+use crate::app::input::camera::ChosenCamera;
 use crate::app::input::scripted::{ScriptedActions, ScriptedInputs};
 use crate::app::mode::Mode;
 use crate::app::stage::actors::ShownMarks;
@@ -89,7 +89,8 @@ impl GamePlugin {
             .insert_resource(Hud { on: !args.no_hud, help: false })
             .insert_resource(ShownMarks { contacts: args.contacts, joints: args.joints })
             .insert_resource(TrainingOptions { learn: args.learn.clone(), seed: args.seed() })
-            .insert_resource(FirstCamera(args.camera))
+            .insert_resource(ChosenCamera(args.camera))
+            .insert_resource(args.steering)
             .insert_resource(args.fixed_settings())
             .insert_resource(args.mappings())
             .insert_resource(ScriptedActions::new(args.action.clone()))

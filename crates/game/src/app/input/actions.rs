@@ -75,12 +75,16 @@ pub struct ActionRequested(pub Action);
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ActionPressed(pub Action);
 
-/// Keys that steer while the character takes commands: ahead and back, to the left and right, and a step aside to the left and
-/// right.
+/// Keys that steer while the character takes commands: ahead and back, to the left and right, and, if the stick is the
+/// character's, a step aside to the left and right.
 pub const STEERING_KEYS: [KeyCode; 6] =
     [KeyCode::ArrowUp, KeyCode::ArrowDown, KeyCode::ArrowLeft, KeyCode::ArrowRight, KeyCode::KeyA, KeyCode::KeyD];
+/// Keys that steer besides the arrows if the stick is the camera's: ahead and back, to the left and right.
+pub const MOVE_KEYS: [KeyCode; 4] = [KeyCode::KeyW, KeyCode::KeyS, KeyCode::KeyA, KeyCode::KeyD];
+/// Keys that make a character run while they are held, if the stick is the camera's.
+pub const RUN_KEYS: [KeyCode; 2] = [KeyCode::ShiftLeft, KeyCode::ShiftRight];
 /// Keys for the first and the second button of a command, such as a jump, for characters that turn.
-pub const COMMAND_KEYS: [KeyCode; 2] = [KeyCode::KeyW, KeyCode::KeyV];
+pub const COMMAND_KEYS: [KeyCode; 2] = [KeyCode::Space, KeyCode::KeyV];
 /// Gamepad buttons for the same.
 pub const COMMAND_BUTTONS: [GamepadButton; 2] = [GamepadButton::South, GamepadButton::East];
 
@@ -91,12 +95,16 @@ pub struct Steering {
     pub on: bool,
     /// The `COMMAND_KEYS` and `COMMAND_BUTTONS`.
     pub buttons: bool,
+    /// The `MOVE_KEYS`: a stick points to a direction of the picture.
+    pub by_camera: bool,
 }
 
 impl Steering {
     /// Whether a key steers and has no other action.
     pub fn takes_key(&self, key: KeyCode) -> bool {
-        self.on && STEERING_KEYS.contains(&key) || self.buttons && COMMAND_KEYS.contains(&key)
+        self.on && STEERING_KEYS.contains(&key)
+            || self.buttons && COMMAND_KEYS.contains(&key)
+            || self.by_camera && MOVE_KEYS.contains(&key)
     }
 
     /// Whether a gamepad button steers and has no other action.

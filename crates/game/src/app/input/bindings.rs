@@ -15,7 +15,7 @@ type Row = (Action, &'static str, KeyCode, Option<GamepadButton>);
 
 const DEFAULTS: [Row; 29] = [
     (Action::Menu, "menu", KeyCode::Escape, Some(GamepadButton::Start)),
-    (Action::Pause, "pause", KeyCode::Space, Some(GamepadButton::Select)),
+    (Action::Pause, "pause", KeyCode::Enter, Some(GamepadButton::Select)),
     (Action::Step, "one step", KeyCode::Period, None),
     (Action::Faster, "faster", KeyCode::ArrowUp, Some(GamepadButton::DPadUp)),
     (Action::Slower, "slower", KeyCode::ArrowDown, Some(GamepadButton::DPadDown)),

@@ -2,8 +2,11 @@
 
 use crate::app::files::free_name;
 use crate::app::input::actions::{Action, ActionPressed, Steering};
+use crate::app::input::steering::turns;
 use crate::app::mode::AppSet;
+use crate::app::mode::Mode;
 use crate::app::notifications::Notifications;
+use crate::app::stage::actors::Actor;
 use crate::app::stage::scenario::Scenario;
 use bevy::input::gamepad::{Gamepad, GamepadAxis};
 use bevy::input::mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll};
@@ -11,35 +14,57 @@ use bevy::prelude::*;
 use bevy::render::view::screenshot::{Screenshot, save_to_disk};
 use bevy_egui::PrimaryEguiContext;
 use bevy_egui::input::EguiWantsInput;
+use bevy_marathon::Anatomy;
 use bevy_marathon::look::{CameraMode, FollowCamera};
 
 /// Radians per pixel of the mouse, and per second of a stick.
 const TURN: [f32; 2] = [0.005, 2.2];
 
-/// The first place of the camera.
+/// The place of the camera that the user has chosen. Without one, it is behind characters that turn, and beside others.
 #[derive(Resource)]
-pub struct FirstCamera(pub CameraMode);
+pub struct ChosenCamera(pub Option<CameraMode>);
 
 pub(super) fn plugin(app: &mut App) {
-    app.add_systems(Startup, spawn)
-        .add_systems(Update, (next_place.in_set(AppSet::Input), (look, save_picture).in_set(AppSet::Present)));
+    app.add_systems(Startup, spawn).add_systems(
+        Update,
+        (next_place.in_set(AppSet::Input), (choose_place, look, save_picture).in_set(AppSet::Present)),
+    );
 }
 
-fn spawn(mut commands: Commands, first: Res<FirstCamera>) {
+fn spawn(mut commands: Commands, chosen: Res<ChosenCamera>) {
     let mut camera = FollowCamera::default();
-    camera.set_mode(first.0);
+    camera.set_mode(chosen.0.unwrap_or_default());
     commands.spawn((camera, PrimaryEguiContext));
+}
+
+/// Puts the camera behind or beside new characters, unless the user has chosen a place.
+fn choose_place(
+    chosen: Res<ChosenCamera>,
+    scenario: Res<Scenario>,
+    new: Query<(&Actor, &Anatomy), Added<Anatomy>>,
+    mut cameras: Query<&mut FollowCamera>,
+) {
+    let first = new.iter().find(|(actor, _)| actor.0 == 0).filter(|_| chosen.0.is_none());
+    let Some((_, anatomy)) = first else { return };
+    let steered = anatomy.spec.as_ref().is_some_and(|spec| turns(&spec.command));
+    let behind = steered && matches!(scenario.mode, Mode::Watch | Mode::Push);
+    let mode = if behind { CameraMode::Chase } else { CameraMode::Side };
+    for mut camera in &mut cameras {
+        camera.set_mode(mode);
+    }
 }
 
 fn next_place(
     mut actions: MessageReader<ActionPressed>,
     mut cameras: Query<&mut FollowCamera>,
+    mut chosen: ResMut<ChosenCamera>,
     mut notes: ResMut<Notifications>,
 ) {
     for _ in actions.read().filter(|action| action.0 == Action::Camera) {
         for mut camera in &mut cameras {
             let mode = camera.mode.next();
             camera.set_mode(mode);
+            chosen.0 = Some(mode);
             notes.say(format!("camera: {}", mode.name()));
         }
     }

@@ -1,7 +1,9 @@
 //! Sticks, triggers and keys command the character in focus, if its agent takes commands. The deflections of a device pass its
-//! [mapping](Mapping).
+//! [mapping](Mapping). A [frame](SteeringFrame) says which way a stick points.
 
-use crate::app::input::actions::{Action, ActionPressed, COMMAND_BUTTONS, COMMAND_KEYS, STEERING_KEYS, Steering};
+use crate::app::input::actions::{
+    Action, ActionPressed, COMMAND_BUTTONS, COMMAND_KEYS, MOVE_KEYS, RUN_KEYS, STEERING_KEYS, Steering,
+};
 use crate::app::input::bindings;
 use crate::app::input::key_names::{button_name, key_name};
 use crate::app::input::response::{Mapping, Mappings};
@@ -14,8 +16,24 @@ use bevy::input::InputSystems;
 use bevy::input::gamepad::{Gamepad, GamepadAxis};
 use bevy::prelude::*;
 use bevy_egui::input::EguiWantsInput;
-use bevy_marathon::{AgentCommand, Anatomy, Ground, RagdollState, Restart};
+use bevy_marathon::look::FollowCamera;
+use bevy_marathon::{AgentCommand, Anatomy, Ground, MoveDirection, RagdollState, Restart};
+use clap::ValueEnum;
 use marathon_envs::CommandRange;
+
+/// The frame of a stick, for characters that turn.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum SteeringFrame {
+    /// Up is away from the camera: the character goes where the stick points in the picture. On courses, and for characters that
+    /// do not turn, as with `character`.
+    #[default]
+    Camera,
+    /// Up is the character's speed, left its turn.
+    Character,
+}
+
+/// Pace of the keys without [`RUN_KEYS`].
+const WALK: f32 = 0.5;
 
 /// Deflection ahead, to the left, and aside to the left, in [-1, 1], and two buttons, 0 or 1.
 type Deflection = [f32; 5];
@@ -73,7 +91,12 @@ pub struct Control {
 }
 
 /// The controls for a command with these ranges, in the order in which [`command_of`] reads them.
-pub fn controls(ranges: &[CommandRange]) -> Vec<Control> {
+pub fn controls(ranges: &[CommandRange], by_camera: bool) -> Vec<Control> {
+    if by_camera {
+        let move_it = Control { keys: "W A S D", pad: "left stick", does: "move".into() };
+        let run = Control { keys: "Shift", pad: "left stick", does: "run".into() };
+        return [move_it, run].into_iter().chain(command_controls(ranges)).collect();
+    }
     let control = |keys, pad, i: usize| Control { keys, pad, does: ranges[i].name.replace('_', " ") };
     let number_of = |is: fn(&CommandRange) -> bool| ranges.iter().position(is);
     let kinds = [CommandRange::is_speed, CommandRange::is_turn, CommandRange::is_button].map(number_of);
@@ -87,8 +110,7 @@ pub fn controls(ranges: &[CommandRange]) -> Vec<Control> {
             if let Some(second) = ranges.iter().skip(speed + 1).position(CommandRange::is_speed) {
                 all.push(Control { does: "step aside".into(), ..control("A D", "triggers", speed + 1 + second) });
             }
-            let names = COMMAND_KEYS.map(key_name).into_iter().zip(COMMAND_BUTTONS.map(button_name));
-            all.extend(buttons(ranges).zip(names).map(|(i, (key, pad))| control(key, pad, i)));
+            all.extend(command_controls(ranges));
             all
         }
         _ => {
@@ -98,8 +120,16 @@ pub fn controls(ranges: &[CommandRange]) -> Vec<Control> {
     }
 }
 
+/// The controls of the buttons of a command.
+fn command_controls(ranges: &[CommandRange]) -> impl Iterator<Item = Control> {
+    let names = COMMAND_KEYS.map(key_name).into_iter().zip(COMMAND_BUTTONS.map(button_name));
+    buttons(ranges).zip(names).map(|(i, (keys, pad))| Control { keys, pad, does: ranges[i].name.replace('_', " ") })
+}
+
 pub(super) fn plugin(app: &mut App) {
-    app.init_resource::<Mappings>().add_systems(PreUpdate, steer.after(InputSystems).before(bindings::read));
+    app.init_resource::<Mappings>()
+        .init_resource::<SteeringFrame>()
+        .add_systems(PreUpdate, steer.after(InputSystems).before(bindings::read));
 }
 
 /// Sends the command of the first gamepad and the keys to the character in focus, and those of other gamepads to the
@@ -108,31 +138,38 @@ pub(super) fn plugin(app: &mut App) {
 #[expect(clippy::too_many_arguments, reason = "a system names what it uses")]
 #[allow(clippy::type_complexity, reason = "a query names what it reads")]
 fn steer(
+    mut commands: Commands,
     keys: Res<ButtonInput<KeyCode>>,
     pads: Query<(Entity, &Gamepad)>,
     wants: Option<Res<EguiWantsInput>>,
     mut actions: MessageReader<ActionPressed>,
     (scenario, loaded, focus): (Res<Scenario>, Res<LoadedPolicy>, Res<Focus>),
     mut steering: ResMut<Steering>,
-    mappings: Res<Mappings>,
+    (mappings, frame): (Res<Mappings>, Res<SteeringFrame>),
     time: Res<Time<Real>>,
     mut deflections: Local<Deflections>,
-    mut actors: Query<(&Actor, &Anatomy, Option<&mut AgentCommand>, &mut Restart), With<RagdollState>>,
+    cameras: Query<&Transform, With<FollowCamera>>,
+    mut actors: Query<
+        (Entity, &Actor, &Anatomy, Option<&mut AgentCommand>, &mut Restart, Option<&mut MoveDirection>),
+        With<RagdollState>,
+    >,
 ) {
     let on_course = scenario.mode == Mode::Course;
     // on a course the runner stays under player control until the run ends
     let released = actions.read().filter(|action| action.0 == Action::Release).count() > 0 && !on_course;
     let spectator = on_course && scenario.course.role != PlayerRole::Run;
     let typing = wants.is_some_and(|w| w.wants_keyboard_input());
-    deflections.update(&pads, of_keys((!typing).then_some(&*keys)), &mappings, time.delta_secs());
+    let held = of_keys((!typing).then_some(&*keys), steering.by_camera);
+    deflections.update(&pads, held, &mappings, time.delta_secs());
     let (mut own, count) = (Steering::default(), actors.iter().count());
-    for (actor, anatomy, command, mut restart) in &mut actors {
+    for (entity, actor, anatomy, command, mut restart, movement) in &mut actors {
         let ranges = anatomy.spec.as_ref().map_or(&[][..], |spec| &spec.command);
         let player = (actor.0 + count).saturating_sub(focus.0) % count;
         let led = (player < deflections.players() || on_course) && !ranges.is_empty() && !spectator;
         let deflection = deflections.of(player);
+        let by_camera = *frame == SteeringFrame::Camera && turns(ranges) && !on_course;
         if led && player == 0 {
-            own = Steering { on: true, buttons: buttons(ranges).next().is_some() };
+            own = Steering { on: true, buttons: buttons(ranges).next().is_some(), by_camera };
         }
         let values = command.as_ref().and_then(|command| command.values());
         let steered = led && !released && (values.is_some() || deflection != REST);
@@ -140,7 +177,26 @@ fn steer(
         if !on_course && *restart != timed {
             *restart = timed;
         }
-        let wanted = steered.then(|| command_of(ranges, deflection));
+        let direction = cameras.iter().next().filter(|_| steered && by_camera).map(|camera| seen(camera, deflection));
+        match (direction, movement) {
+            (Some(direction), Some(mut movement)) if movement.direction != direction => movement.direction = direction,
+            (Some(direction), None) => drop(commands.entity(entity).insert(MoveDirection::new(direction))),
+            (None, Some(_)) => drop(commands.entity(entity).remove::<MoveDirection>()),
+            _ => {}
+        }
+        let wanted = steered.then(|| match direction {
+            None => command_of(ranges, deflection),
+            // the plugin moves the character
+            Some(_) => {
+                let [.., first, second] = deflection;
+                let mut wanted = command_of(ranges, [0.0, 0.0, 0.0, first, second]);
+                let moves = |range: &CommandRange| range.is_speed() || range.is_turn();
+                for (i, range) in ranges.iter().enumerate().filter(|(_, range)| moves(range)) {
+                    wanted[i] = values.map_or(range.rest(), |values| values[i]);
+                }
+                wanted
+            }
+        });
         if values != wanted.as_deref()
             && let Some(mut command) = command
         {
@@ -169,11 +225,32 @@ fn of_pad(pad: &Gamepad, mapping: &Mapping) -> Deflection {
 }
 
 /// The deflection of the keyboard.
-fn of_keys(keys: Option<&ButtonInput<KeyCode>>) -> Deflection {
+fn of_keys(keys: Option<&ButtonInput<KeyCode>>, by_camera: bool) -> Deflection {
     let pressed = |key| f32::from(keys.is_some_and(|keys| keys.pressed(key)));
     let [up, down, left, right, aside_left, aside_right] = STEERING_KEYS.map(pressed);
     let [first, second] = COMMAND_KEYS.map(pressed);
-    [up - down, left - right, aside_left - aside_right, first, second]
+    if !by_camera {
+        return [up - down, left - right, aside_left - aside_right, first, second];
+    }
+    let letters = MOVE_KEYS.map(pressed);
+    let [up, down, left, right] =
+        [up.max(letters[0]), down.max(letters[1]), left.max(letters[2]), right.max(letters[3])];
+    let pace = if RUN_KEYS.map(pressed).contains(&1.0) { 1.0 } else { WALK };
+    let way = Vec2::new(up - down, left - right).normalize_or_zero() * pace;
+    [way.x, way.y, 0.0, first, second]
+}
+
+/// The direction of the world to which a stick points in the picture of a camera.
+fn seen(camera: &Transform, [ahead, left, ..]: Deflection) -> Vec3 {
+    // from straight above, up in the picture is ahead
+    let forward = camera.forward().with_y(0.0).try_normalize().unwrap_or(*camera.up());
+    let right = forward.cross(Vec3::Y);
+    (ahead * forward - left * right).clamp_length_max(1.0)
+}
+
+/// Whether a command has a speed and a turn.
+pub fn turns(ranges: &[CommandRange]) -> bool {
+    ranges.iter().any(CommandRange::is_speed) && ranges.iter().any(CommandRange::is_turn)
 }
 
 /// The entries of a command that buttons set, for characters that turn.
@@ -294,17 +371,48 @@ mod tests {
     }
 
     #[test]
+    fn a_stick_points_to_a_direction_of_the_picture() {
+        let camera = Transform::from_xyz(0.0, 2.0, 5.0).looking_at(Vec3::ZERO, Vec3::Y);
+        for (stick, expected) in [
+            ([1.0, 0.0], Vec3::NEG_Z),
+            ([0.0, 1.0], Vec3::NEG_X),
+            ([-0.5, 0.0], 0.5 * Vec3::Z),
+            ([0.0, 0.0], Vec3::ZERO),
+        ] {
+            let direction = seen(&camera, [stick[0], stick[1], 0.0, 0.0, 0.0]);
+            assert!(direction.distance(expected) < 1e-6, "{stick:?}: {direction}");
+        }
+        // a corner of the stick is no faster
+        assert!((seen(&camera, [1.0, 1.0, 0.0, 0.0, 0.0]).length() - 1.0).abs() < 1e-6);
+        let above = Transform::from_xyz(0.0, 5.0, 0.0).looking_at(Vec3::ZERO, Vec3::X);
+        assert!(seen(&above, [1.0, 0.0, 0.0, 0.0, 0.0]).distance(Vec3::X) < 1e-6);
+    }
+
+    #[test]
+    fn letters_move_by_the_camera_and_step_aside_without() {
+        let mut keys = ButtonInput::<KeyCode>::default();
+        keys.press(KeyCode::KeyA);
+        assert_eq!(of_keys(Some(&keys), false), [0.0, 0.0, 1.0, 0.0, 0.0]);
+        assert_eq!(of_keys(Some(&keys), true), [0.0, WALK, 0.0, 0.0, 0.0]);
+        keys.press(KeyCode::ShiftLeft);
+        keys.press(KeyCode::KeyW);
+        let [ahead, left, ..] = of_keys(Some(&keys), true);
+        assert!((ahead.hypot(left) - 1.0).abs() < 1e-6 && ahead == left);
+        assert_eq!(of_keys(None, true), REST);
+    }
+
+    #[test]
     fn controls_have_the_names_of_what_they_set() {
         let range = |name, unit| CommandRange::new(name, 0.0..=1.0, unit);
         let names = |ranges: &[CommandRange]| {
-            controls(ranges).into_iter().map(|c| format!("{}/{}: {}", c.keys, c.pad, c.does)).collect::<Vec<_>>()
+            controls(ranges, false).into_iter().map(|c| format!("{}/{}: {}", c.keys, c.pad, c.does)).collect::<Vec<_>>()
         };
         let all = [range("speed", "m/s"), range("left", "m/s"), range("turn", "rad/s"), range("jump", "")];
         let with_all = [
             "Up Down/left stick: speed",
             "Left Right/left stick: turn",
             "A D/triggers: step aside",
-            "W/A: jump",
+            "Space/A: jump",
             "V/B: back flip",
         ];
         assert_eq!(names(&[&all[..], &[range("back_flip", "")]].concat()), with_all);
@@ -313,5 +421,7 @@ mod tests {
         assert_eq!(names(&all[..1]), ["arrows/left stick: speed"]);
         assert_eq!(names(&all[3..]), ["Up Down/left stick: jump"]);
         assert!(names(&[]).is_empty());
+        let by_camera = controls(&all, true).into_iter().map(|c| format!("{}: {}", c.keys, c.does)).collect::<Vec<_>>();
+        assert_eq!(by_camera, ["W A S D: move", "Shift: run", "Space: jump"]);
     }
 }

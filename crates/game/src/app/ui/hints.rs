@@ -99,7 +99,7 @@ fn draw(
     }
     let actor = actors.iter().find(|(actor, _)| actor.0 == focus.0);
     let ranges = actor.and_then(|(_, anatomy)| anatomy.spec.as_ref()).map_or(&[][..], |spec| &spec.command);
-    let controls = if steering.on { controls(ranges) } else { Vec::new() };
+    let controls = if steering.on { controls(ranges, steering.by_camera) } else { Vec::new() };
     let hints = Hints {
         bindings: &bindings,
         key_hints: &key_hints,
@@ -257,6 +257,8 @@ mod tests {
     use super::*;
     use crate::app::cli::{self, Args};
     use crate::app::features;
+    use crate::app::input::steering::turns;
+    use crate::app::mode::Mode;
     use crate::app::stage::policies::ShippedPolicies;
     use clap::Parser;
     use marathon_runs::TaskConfig;
@@ -267,7 +269,9 @@ mod tests {
         let args = Args::parse_from([&["marathon-game"], words].concat());
         let scenario = cli::scenario(&args, &ShippedPolicies::decode())?;
         let ranges = TaskConfig::named(&scenario.agent)?.factory()?.spec().command.clone();
-        let steering = Steering { on: !ranges.is_empty(), buttons: controls(&ranges).iter().any(|c| c.keys == "W") };
+        let by_camera = turns(&ranges) && scenario.mode != Mode::Course;
+        let buttons = controls(&ranges, by_camera).iter().any(|control| control.keys == "Space");
+        let steering = Steering { on: !ranges.is_empty(), buttons, by_camera };
         let (bindings, key_hints) = (Bindings::default(), features::key_hints());
         let hints = Hints {
             bindings: &bindings,
@@ -275,7 +279,7 @@ mod tests {
             keys: key_hints.of(&scenario),
             several: scenario.agents > 1,
             steering,
-            controls: controls(&ranges),
+            controls: controls(&ranges, by_camera),
             pads,
         };
         Ok((hints.line(1280.0), hints.rows()))
@@ -285,7 +289,7 @@ mod tests {
     fn what_steers_is_on_the_screen_by_its_key() -> Result<(), Box<dyn std::error::Error>> {
         let (line, rows) = hints(&["MarathonManController"], false)?;
         for (key, does) in
-            [("Up Down", "speed"), ("Left Right", "turn"), ("W", "jump"), ("V", "backflip"), ("G", "let go")]
+            [("W A S D", "move"), ("Shift", "run"), ("Space", "jump"), ("V", "backflip"), ("G", "let go")]
         {
             assert!(line.iter().any(|(k, d)| (k.as_str(), d.as_str()) == (key, does)), "{key} {does}: {line:?}");
         }
@@ -295,7 +299,7 @@ mod tests {
         }
         let of =
             |name: &str| rows.iter().find(|(.., does)| does == name).map(|(key, pad, _)| (key.as_str(), pad.as_str()));
-        assert_eq!([of("jump"), of("backflip")], [Some(("W", "A")), Some(("V", "B"))]);
+        assert_eq!([of("jump"), of("backflip")], [Some(("Space", "A")), Some(("V", "B"))]);
         // the gamepad's A and B usually push and throw; the D-pad takes over the actions of the arrow keys
         assert_eq!([of("push"), of("faster")], [Some(("P", "")), Some(("", "D-pad up"))]);
         let (line, _) = hints(&["MarathonManController"], true)?;
