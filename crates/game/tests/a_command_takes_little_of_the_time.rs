@@ -32,7 +32,11 @@ enum Device {
 
 /// Seconds from the event until 90 % of the command, and of the speed, are there.
 fn latency(device: Device, words: &[&str]) -> [f64; 2] {
-    let mut app = windowless::game(&[&["AntController", "--agents", "1"], words].concat(), FRAME, |_| ());
+    let mut app = windowless::game(
+        &[&["AntController", "--agents", "1", "--steering", "character"], words].concat(),
+        FRAME,
+        |_| (),
+    );
     let pad = pad(&mut app);
     // after its first command the character stays under command, and stands without input
     push(&mut app, pad, GamepadAxis::LeftStickY, 1.0);

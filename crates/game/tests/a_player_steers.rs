@@ -51,7 +51,7 @@ fn commands(app: &mut App) -> Vec<(f64, bool)> {
 fn stick_and_arrow_keys_steer_the_character_in_focus() {
     let mut app = game(&["--agents", "2"]);
     let pad = pad(&mut app);
-    assert_eq!(*app.world().resource::<Steering>(), Steering { on: true, buttons: false });
+    assert_eq!(*app.world().resource::<Steering>(), Steering { on: true, buttons: false, by_camera: false });
     let own = commands(&mut app);
     assert!(own.iter().all(|(x, mine)| x.abs() <= 2.0 && !mine) && own[0] != own[1], "{own:?}");
     // beyond the dead zone of 0.12 it begins at 0, and its end is the range's
@@ -149,7 +149,10 @@ fn held_keys_and_sticks_steer() {
 /// The Ant goes where the stick, the triggers and the keys A and D say; the mapping is what the command line says.
 #[test]
 fn who_can_step_aside_does_so_by_triggers_and_keys() {
-    let mut app = game_of("AntController", &["--curve", "2", "--smoothing", "0.1", "--key-smoothing", "0.2"]);
+    let mut app = game_of(
+        "AntController",
+        &["--steering", "character", "--curve", "2", "--smoothing", "0.1", "--key-smoothing", "0.2"],
+    );
     let pad = pad(&mut app);
     let command = |app: &mut App| {
         let mut query = app.world_mut().query::<&Episode>();
@@ -210,7 +213,7 @@ fn an_agent_without_commands_leaves_stick_and_keys_as_they_were() {
 /// The policy that comes with him is good enough to be led: he runs when the stick is up, and stands when it is released.
 #[test]
 fn marathon_man_goes_as_the_stick_says() {
-    let mut app = game_of("MarathonManSteer", &[]);
+    let mut app = game_of("MarathonManSteer", &["--steering", "character"]);
     let pad = pad(&mut app);
     let errors = |app: &mut App, seconds: usize| {
         let mut sum = 0.0;
@@ -230,6 +233,103 @@ fn marathon_man_goes_as_the_stick_says() {
         let error = errors(&mut app, 2);
         assert!(error < 0.5, "{error} m/s off {speed}");
     }
+}
+
+/// Place and velocity along the ground of the only character.
+fn motion(app: &mut App) -> (Vec3, Vec3) {
+    let mut query = app.world_mut().query_filtered::<(&RagdollState, &Transform), With<Actor>>();
+    let (key, track) = query.single(app.world()).expect("one character");
+    let state = app.world().resource::<Marathon>().state(key).expect("it is simulated");
+    let at = |v: &[f64]| bevy_marathon::axes::to_game([v[0], v[1], 0.0]);
+    (track.transform_point(at(&state.qpos)), track.rotation * at(&state.qvel))
+}
+
+/// The only camera, and where it is.
+fn camera(app: &mut App) -> (Mut<'_, FollowCamera>, Transform) {
+    let mut query = app.world_mut().query::<(&mut FollowCamera, &Transform)>();
+    let (camera, at) = query.single_mut(app.world_mut()).expect("one camera");
+    (camera, *at)
+}
+
+#[test]
+fn the_stick_points_into_the_picture() {
+    let mut app = game_of("MarathonManController", &["--seed", "3"]);
+    let pad = pad(&mut app);
+    let steering = Steering { on: true, buttons: true, by_camera: true };
+    assert_eq!((*app.world().resource::<Steering>(), camera(&mut app).0.mode), (steering, CameraMode::Chase));
+    // it stands where it is put
+    camera(&mut app).0.mode = CameraMode::Free;
+    for (x, y) in [(0.0, 0.6), (0.6, 0.0), (0.0, -0.6), (-0.6, 0.0), (0.45, 0.45)] {
+        push(&mut app, pad, GamepadAxis::LeftStickX, x);
+        push(&mut app, pad, GamepadAxis::LeftStickY, y);
+        frames(&mut app, 100);
+        let from = motion(&mut app).0;
+        frames(&mut app, 50);
+        let way = motion(&mut app).0 - from;
+        let (_, at) = camera(&mut app);
+        let pointed = x * at.right().with_y(0.0).normalize() + y * at.forward().with_y(0.0).normalize();
+        let angle = way.angle_between(pointed).to_degrees();
+        assert!(angle < 25.0 && way.length() > 0.7, "({x}, {y}): {angle} degrees off, {} m", way.length());
+    }
+    // he stands without a stick, and jumps meanwhile
+    for axis in [GamepadAxis::LeftStickX, GamepadAxis::LeftStickY] {
+        push(&mut app, pad, axis, 0.0);
+    }
+    press(&mut app, pad, GamepadButton::South);
+    frames(&mut app, 3);
+    let command = |app: &mut App| {
+        let mut query = app.world_mut().query::<&AgentCommand>();
+        query.single(app.world()).expect("one character").values().map(<[f64]>::to_vec)
+    };
+    assert_eq!(command(&mut app).map(|values| values[..3].to_vec()), Some(vec![0.0; 3]));
+    // released, he follows his schedule
+    press(&mut app, pad, GamepadButton::LeftThumb);
+    frames(&mut app, 3);
+    assert_eq!(command(&mut app), None);
+    assert!(app.world_mut().query::<&MoveDirection>().iter(app.world()).next().is_none());
+}
+
+#[test]
+fn shift_runs_and_letters_walk() {
+    let mut app = game_of("MarathonManController", &["--seed", "3"]);
+    let speed = |app: &mut App| {
+        frames(app, 150);
+        let from = motion(app).0;
+        frames(app, 50);
+        (motion(app).0 - from).length()
+    };
+    key(&mut app, KeyCode::KeyW, ButtonState::Pressed);
+    let walk = speed(&mut app);
+    key(&mut app, KeyCode::ShiftLeft, ButtonState::Pressed);
+    let run = speed(&mut app);
+    assert!((1.1..1.8).contains(&walk) && run > 2.2, "{walk} and {run} m/s");
+    assert_eq!(app.world().resource::<Time<Virtual>>().relative_speed(), 1.0);
+}
+
+/// On a circle of five meters the character stays in the middle third of the picture, and the camera gets behind it.
+#[test]
+fn the_camera_stays_behind_who_runs_in_a_circle() {
+    let mut app = game_of("MarathonManController", &["--seed", "3", "--steering", "character"]);
+    let pad = pad(&mut app);
+    // 1.5 m/s and 0.3 rad/s, beyond the dead zone
+    push(&mut app, pad, GamepadAxis::LeftStickY, 0.56);
+    push(&mut app, pad, GamepadAxis::LeftStickX, -0.288);
+    let mut most = 0.0_f32;
+    for frame in 0..50 * 30 {
+        app.update();
+        let (place, velocity) = motion(&mut app);
+        let (_, at) = camera(&mut app);
+        let seen = at.compute_affine().inverse().transform_point3(place.with_y(1.0));
+        // half of the picture's width at a distance of 1 m: 0.75 rad from top to bottom, 16 to 9
+        let half = (0.5_f32 * 0.75).tan() * 16.0 / 9.0;
+        most = most.max((seen.x / (-seen.z * half)).abs());
+        assert!(at.translation.y > 0.05, "above the ground");
+        if frame > 50 * 10 && velocity.length() > 1.0 {
+            let behind = at.forward().with_y(0.0).angle_between(velocity).to_degrees();
+            assert!(behind < 60.0, "{behind} degrees after {frame} frames");
+        }
+    }
+    assert!(most < 1.0 / 3.0, "{most} of half the picture");
 }
 
 /// The ends of the episodes so far.

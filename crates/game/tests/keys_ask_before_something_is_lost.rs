@@ -118,7 +118,7 @@ fn esc_leaves_a_binding_as_it_is_and_a_closed_menu_mutes_no_key() {
     app.world_mut().resource_mut::<Rebinding>().0 = Some(Action::Push);
     app.world_mut().resource_mut::<Menu>().open = false;
     frames(&mut app, 2);
-    press(&mut app, KeyCode::Space);
+    press(&mut app, KeyCode::Enter);
     assert!(app.world().resource::<Time<Virtual>>().is_paused(), "keys are heard");
     assert_eq!(app.world().resource::<Bindings>(), &Bindings::default());
 }

@@ -27,7 +27,7 @@ fn app(words: &[&str]) -> App {
 fn press(app: &mut App, action: Action) {
     let name = app.world().resource::<Bindings>().key(action);
     let key_code = match name {
-        "Space" => KeyCode::Space,
+        "Enter" => KeyCode::Enter,
         "Tab" => KeyCode::Tab,
         "Up" => KeyCode::ArrowUp,
         "Left" => KeyCode::ArrowLeft,
