@@ -13,6 +13,7 @@ mod steer;
 use bevy::input::ButtonState;
 use bevy::input::gamepad::{GamepadAxis, GamepadButton};
 use bevy::prelude::*;
+use bevy_marathon::look::CameraMode;
 use bevy_marathon::prelude::*;
 use clap::Parser;
 use devices::{key, pad, press, pull, push};
