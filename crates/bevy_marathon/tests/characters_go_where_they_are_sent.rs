@@ -63,6 +63,7 @@ fn marathon_man_turns_to_where_he_is_sent() {
     for (pace, speeds) in [(0.5, 1.2..1.6), (1.0, 2.0..3.0)] {
         let found = send("MarathonManController", pace, 100);
         let [median, most] = [0.5, 0.95].map(|share| found.quantile(share));
+        println!("MarathonManController at {pace}: {median:.1} and {most:.1} degrees, {:.2} m/s", found.speed);
         assert!(median <= 10.0 && most <= 25.0, "pace {pace}: median {median} degrees, 95 % {most}");
         assert!(speeds.contains(&found.speed), "pace {pace}: {} m/s", found.speed);
     }
@@ -72,6 +73,7 @@ fn marathon_man_turns_to_where_he_is_sent() {
 fn the_ant_goes_there_without_turning() {
     let found = send("AntController", 0.5, 100);
     let [median, most] = [0.5, 0.95].map(|share| found.quantile(share));
+    println!("AntController at 0.5: {median:.1} and {most:.1} degrees, {:.2} m/s", found.speed);
     assert!(median <= 5.0 && most <= 15.0, "median {median} degrees, 95 % {most}");
     assert!((1.0..1.8).contains(&found.speed), "{} m/s", found.speed);
 }
