@@ -67,7 +67,7 @@ pub fn run(options: &ReproduceOptions, json: bool) -> Result<(), StudyError> {
     if json {
         print_json(&serde_json::json!({ "results": rows }));
     } else {
-        say(page(&rows));
+        say(page(&rows).trim_end());
     }
     match failed {
         0 => Ok(()),

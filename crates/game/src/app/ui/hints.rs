@@ -303,7 +303,7 @@ mod tests {
         // the gamepad's A and B usually push and throw; the D-pad takes over the actions of the arrow keys
         assert_eq!([of("push"), of("faster")], [Some(("P", "")), Some(("", "D-pad up"))]);
         let (line, _) = hints(&["MarathonManController"], true)?;
-        assert!(line.contains(&("W | pad A".into(), "jump".into())), "{line:?}");
+        assert!(line.contains(&("Space | pad A".into(), "jump".into())), "{line:?}");
         Ok(())
     }
 
