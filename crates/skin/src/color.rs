@@ -1,0 +1,107 @@
+//! Vertex colors: the model's own, or one per group of bodies, darkened where the surface is hidden from the sky.
+
+use crate::field::Field;
+use crate::figure::Figure;
+use crate::solid::Kind;
+use glam::DVec3;
+
+/// sRGB of trunk, limbs, and the ends of limbs, for models without colors.
+const PALETTE: [[f64; 3]; 3] = [[0.79, 0.26, 0.18], [0.83, 0.62, 0.47], [0.95, 0.91, 0.84]];
+/// Factors on the brightness of the same groups, for models with one color.
+const TINT: [f64; 3] = [0.86, 1.0, 1.12];
+/// Width of the border between two colors, in cells.
+const BORDER: f64 = 0.3;
+/// Points along the normal that ambient occlusion samples.
+const TAPS: i32 = 5;
+/// Darkest ambient occlusion.
+const DARKEST: f64 = 0.45;
+
+/// Group of bodies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Group {
+    Trunk,
+    Limb,
+    End,
+}
+
+/// Linear RGB of each part of a character.
+pub(crate) fn of_parts(figure: &Figure) -> Vec<DVec3> {
+    let mut own = figure.parts.iter().map(|part| part.color);
+    let first = own.next().flatten();
+    let one = own.all(|color| color == first);
+    let color = |i: usize| {
+        let group = group(figure, i) as usize;
+        let part = figure.parts[i].color;
+        match part {
+            Some(color) if one => linear(color) * TINT[group],
+            Some(color) => linear(color),
+            None => linear(PALETTE[group]),
+        }
+    };
+    (0..figure.parts.len()).map(|i| color(i).clamp(DVec3::ZERO, DVec3::ONE)).collect()
+}
+
+/// Linear RGB of a point of the surface with ambient occlusion. `depth` is the length of the longest ray of the occlusion, m.
+pub(crate) fn at(field: &Field, parts: &[DVec3], p: DVec3, normal: DVec3, cell: f64, depth: f64) -> DVec3 {
+    let mut near: Vec<(f64, DVec3)> = Vec::new();
+    for solid in field.solids.iter().filter(|solid| solid.kind != Kind::Ball) {
+        if solid.bounds.0.distance(p) - solid.bounds.1 < 2.0 * field.widest + 2.0 * cell {
+            let sample = solid.shape.sample(p);
+            let [from, to] = solid.parts.map(|part| parts[part]);
+            let width = BORDER * cell / solid.length.max(cell);
+            let share = (0.5 + 0.5 * (sample.along - solid.split) / width).clamp(0.0, 1.0);
+            near.push((sample.distance, from.lerp(to, share)));
+        }
+    }
+    let least = near.iter().fold(f64::INFINITY, |least, (distance, _)| least.min(*distance));
+    let (mut color, mut sum) = (DVec3::ZERO, 0.0);
+    for (distance, own) in near {
+        let weight = libm::exp((least - distance) / (BORDER * cell));
+        color += weight * own;
+        sum += weight;
+    }
+    let color = if sum > 0.0 { color / sum } else { DVec3::splat(0.5) };
+    color * open(field, p, normal, depth)
+}
+
+/// Ambient occlusion by the distance field (Evans, "Fast approximations for global illumination on dynamic scenes", 2006):
+/// 1 where the surface is open, less where other parts are nearer than a flat surface would be.
+fn open(field: &Field, p: DVec3, normal: DVec3, depth: f64) -> f64 {
+    let (mut hidden, mut whole, mut weight) = (0.0, 0.0, 1.0);
+    for tap in 1..=TAPS {
+        let height = depth * f64::from(tap) / f64::from(TAPS);
+        let q = p + height * normal;
+        let close =
+            field.solids.iter().enumerate().filter(|(_, solid)| solid.bounds.0.distance(q) - solid.bounds.1 < height);
+        let clear = field.sharp(close.map(|(i, _)| i), q).min(height);
+        hidden += weight * (height - clear).max(0.0) / height;
+        whole += weight;
+        weight *= 0.75;
+    }
+    (1.0 - 1.1 * hidden / whole).clamp(DARKEST, 1.0)
+}
+
+/// The group of a part: the trunk is the root and what has several limbs or hangs in the middle of one, ends are heads,
+/// hands and feet.
+fn group(figure: &Figure, part: usize) -> Group {
+    let here = &figure.parts[part];
+    let bone = &figure.bones[here.bone];
+    let below = |bone: usize| (0..figure.bones.len()).any(|at| figure.bones[at].parent == Some(bone));
+    if here.bone > 0 && !below(here.bone) {
+        return Group::End;
+    }
+    // a part that hangs beside the others of the root, such as a head
+    match here.bone == 0 || bone.children > 1 {
+        true => Group::Trunk,
+        false => Group::Limb,
+    }
+}
+
+/// sRGB to linear light (IEC 61966-2-1).
+fn linear(color: [f64; 3]) -> DVec3 {
+    let channel = |value: f64| {
+        let value = value.clamp(0.0, 1.0);
+        if value <= 0.04045 { value / 12.92 } else { libm::pow((value + 0.055) / 1.055, 2.4) }
+    };
+    DVec3::from_array(color.map(channel))
+}
