@@ -2,6 +2,7 @@
 
 use crate::field::Field;
 use crate::figure::Figure;
+use crate::mesh::Piece;
 use crate::solid::Kind;
 use glam::DVec3;
 
@@ -11,6 +12,10 @@ const PALETTE: [[f64; 3]; 3] = [[0.79, 0.26, 0.18], [0.83, 0.62, 0.47], [0.95, 0
 const TINT: [f64; 3] = [0.86, 1.0, 1.12];
 /// Width of the border between two colors, in cells.
 const BORDER: f64 = 0.3;
+/// Length of the rays of ambient occlusion, in cells.
+const DEPTH: f64 = 5.0;
+/// Passes of smoothing of the occlusion over the mesh.
+const PASSES: usize = 3;
 /// Points along the normal that ambient occlusion samples.
 const TAPS: i32 = 5;
 /// Darkest ambient occlusion.
@@ -41,8 +46,23 @@ pub(crate) fn of_parts(figure: &Figure) -> Vec<DVec3> {
     (0..figure.parts.len()).map(|i| color(i).clamp(DVec3::ZERO, DVec3::ONE)).collect()
 }
 
-/// Linear RGB of a point of the surface with ambient occlusion. `depth` is the length of the longest ray of the occlusion, m.
-pub(crate) fn at(field: &Field, parts: &[DVec3], p: DVec3, normal: DVec3, cell: f64, depth: f64) -> DVec3 {
+/// Linear RGB of the vertices of a piece, with ambient occlusion.
+pub(crate) fn of_piece(field: &Field, parts: &[DVec3], piece: &Piece, cell: f64) -> Vec<DVec3> {
+    let points = piece.surface.points.iter();
+    let mut open: Vec<f64> =
+        points.clone().zip(&piece.normals).map(|(p, n)| openness(field, *p, *n, DEPTH * cell)).collect();
+    for _ in 0..PASSES {
+        let mean = |i: usize| {
+            let around: f64 = piece.neighbors[i].iter().map(|k| open[*k as usize]).sum();
+            0.4 * open[i] + 0.6 * around / piece.neighbors[i].len().max(1) as f64
+        };
+        open = (0..open.len()).map(mean).collect();
+    }
+    points.zip(open).map(|(p, open)| open * base(field, parts, *p, cell)).collect()
+}
+
+/// Linear RGB of a point of the surface.
+fn base(field: &Field, parts: &[DVec3], p: DVec3, cell: f64) -> DVec3 {
     let mut near: Vec<(f64, DVec3)> = Vec::new();
     for solid in field.solids.iter().filter(|solid| solid.kind != Kind::Ball) {
         if solid.bounds.0.distance(p) - solid.bounds.1 < 2.0 * field.widest + 2.0 * cell {
@@ -60,13 +80,12 @@ pub(crate) fn at(field: &Field, parts: &[DVec3], p: DVec3, normal: DVec3, cell: 
         color += weight * own;
         sum += weight;
     }
-    let color = if sum > 0.0 { color / sum } else { DVec3::splat(0.5) };
-    color * open(field, p, normal, depth)
+    if sum > 0.0 { color / sum } else { DVec3::splat(0.5) }
 }
 
 /// Ambient occlusion by the distance field (Evans, "Fast approximations for global illumination on dynamic scenes", 2006):
 /// 1 where the surface is open, less where other parts are nearer than a flat surface would be.
-fn open(field: &Field, p: DVec3, normal: DVec3, depth: f64) -> f64 {
+fn openness(field: &Field, p: DVec3, normal: DVec3, depth: f64) -> f64 {
     let (mut hidden, mut whole, mut weight) = (0.0, 0.0, 1.0);
     for tap in 1..=TAPS {
         let height = depth * f64::from(tap) / f64::from(TAPS);

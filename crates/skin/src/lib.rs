@@ -50,8 +50,6 @@ use mesh::Piece;
 pub const MAX_TRIANGLES: usize = 20_000;
 /// Smallest value of [`Options::triangles`].
 pub const MIN_TRIANGLES: usize = 500;
-/// Length of the rays of ambient occlusion, in cells.
-const OCCLUSION: f64 = 5.0;
 
 /// Options of [`skin`].
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -154,8 +152,8 @@ impl Skin {
             self.joints.push(influences.bones);
             self.weights.push(influences.weights);
         }
-        for (p, normal) in surface.points.iter().zip(normals) {
-            let color = color::at(field, parts, *p, *normal, self.cell, OCCLUSION * self.cell);
+        let colors = color::of_piece(field, parts, piece, self.cell);
+        for ((p, normal), color) in surface.points.iter().zip(normals).zip(colors) {
             let [r, g, b] = color.to_array().map(|c| (255.0 * c + 0.5) as u8);
             self.colors.push([r, g, b, 255]);
             self.positions.push(to_gltf(*p));

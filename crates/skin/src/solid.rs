@@ -10,9 +10,9 @@ use glam::DVec3;
 /// Radius of a ball at a joint, as a fraction of the thinner part: linear blending thins joints.
 const BALL: f64 = 1.04;
 /// Radius of a link's end as a fraction of its part's radius.
-const LINK: f64 = 0.85;
+const LINK: f64 = 0.95;
 /// Largest radius of a link's end as a fraction of the radius at its other end.
-const TAPER: f64 = 1.35;
+const TAPER: f64 = 1.45;
 /// Largest gap that a link fills, as a multiple of the larger radius.
 const WIDEST_GAP: f64 = 4.0;
 /// Overlap of two parts that needs no link, as a fraction of the smaller radius.
@@ -21,6 +21,11 @@ const OVERLAP: f64 = 0.35;
 const PARALLEL_OVERLAP: f64 = 1.2;
 /// Cosine of the largest angle between parallel parts.
 const PARALLEL: f64 = 0.85;
+
+/// Half length of the end of a link that meets the middle of a part, as a multiple of the other part's radius.
+const SPREAD: f64 = 1.1;
+/// Cosine of the smallest angle at which a link meets the middle of a part.
+const ACROSS: f64 = 0.5;
 
 /// What a solid is there for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,13 +126,13 @@ fn link(figure: &Figure, axes: &[Axis], parts: [usize; 2]) -> Option<Solid> {
         return None;
     }
     let mut solid = match side_by_side(&a, &b) {
-        Some([from, to]) if space > -PARALLEL_OVERLAP * small => {
-            let shape = Shape::Sheet { from, to, radii: [a.radius, b.radius].map(|r| 0.97 * r) };
+        Some([from, to]) if apart(from, to) - a.radius - b.radius > -PARALLEL_OVERLAP * small => {
+            let shape = Shape::Sheet { from, to, radii: [a.radius, b.radius] };
             Solid::new(Kind::Link, shape, bones, parts)
         }
         None if space > -OVERLAP * small => {
             let radii = [a.radius, b.radius].map(|r| (LINK * r).min(LINK * TAPER * small));
-            Solid::new(Kind::Link, Shape::Rod { ends: closest(a.ends, b.ends), radii }, bones, parts)
+            Solid::new(Kind::Link, between(&a, &b, radii), bones, parts)
         }
         _ => return None,
     };
@@ -137,6 +142,33 @@ fn link(figure: &Figure, axes: &[Axis], parts: [usize; 2]) -> Option<Solid> {
         solid.split = nearest_on(from, to, figure.bones[joint].anchor).clamp(0.2, 0.8);
     }
     Some(solid)
+}
+
+/// A rod between two parts. Where the end of one meets the middle of the other, it spreads there, as an ankle does over a foot.
+fn between(a: &Axis, b: &Axis, radii: [f64; 2]) -> Shape {
+    let [p, q] = closest(a.ends, b.ends);
+    let spread = |axis: &Axis, at: DVec3, other: &Axis| {
+        let length = axis.ends[0].distance(axis.ends[1]);
+        let way = (axis.ends[1] - axis.ends[0]).normalize_or_zero();
+        let place = (at - axis.ends[0]).dot(way);
+        let reach = SPREAD * other.radius;
+        [place - reach, place + reach].map(|x| axis.ends[0] + x.clamp(0.0, length) * way)
+    };
+    let across = |axis: &Axis| {
+        let way = (axis.ends[1] - axis.ends[0]).normalize_or_zero();
+        let link = (q - p).normalize_or_zero();
+        way != DVec3::ZERO && way.dot(link).abs() < ACROSS
+    };
+    match (across(a), across(b)) {
+        (false, true) => Shape::Sheet { from: [p; 2], to: spread(b, q, a), radii },
+        (true, false) => Shape::Sheet { from: spread(a, p, b), to: [q; 2], radii },
+        _ => Shape::Rod { ends: [p, q], radii },
+    }
+}
+
+/// The larger distance between the ends of two segments, m.
+fn apart(a: [DVec3; 2], b: [DVec3; 2]) -> f64 {
+    a[0].distance(b[0]).max(a[1].distance(b[1]))
 }
 
 /// The axes of two parallel parts that lie beside each other, in one direction; the longer one is cut to twice the
