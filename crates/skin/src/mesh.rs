@@ -14,6 +14,8 @@ const THINNEST: f64 = 1.15;
 const MOST_POINTS: f64 = 6e6;
 /// Rounds in which the cell is adjusted to the number of triangles.
 const ROUNDS: usize = 4;
+/// Fraction of the wanted triangles that is enough.
+const CLOSE: f64 = 0.93;
 /// Rounds in which vertices move along and onto the surface.
 const RELAXATIONS: usize = 3;
 
@@ -26,33 +28,45 @@ pub(crate) struct Piece {
     pub neighbors: Vec<Vec<u32>>,
 }
 
-/// The cell of the grid, m, with which the character has about this many triangles, and not more.
+/// The cell of the grid, m, with which the character has nearly this many triangles, and not more.
 pub(crate) fn cell(figure: &Figure, triangles: usize) -> f64 {
     // surface nets have about 3 triangles per square of the cell's size
     let area: f64 = figure.parts.iter().map(|part| part.shape.area()).sum();
     let mut cell = (3.0 * area / triangles as f64).sqrt();
-    let mut best = None;
-    for _ in 0..ROUNDS {
-        let thick = figure.thickened(THINNEST * cell);
-        let solids = solids(&thick);
-        let field = Field::new(&thick, &solids);
-        let layers = layers(&field, cell);
-        let points: f64 = layers.iter().map(|layer| Grid::count(&field, layer, cell)).sum();
-        if points > MOST_POINTS {
-            cell *= libm::cbrt(points / MOST_POINTS) * 1.01;
-            continue;
-        }
-        let count: usize = layers.iter().map(|layer| surface(&Grid::new(&field, layer, cell)).triangles.len()).sum();
-        let ratio = count as f64 / triangles as f64;
+    let mut best: Option<f64> = None;
+    for round in 0.. {
+        let ratio = match size(figure, cell) {
+            Size::TooFine(factor) => factor * factor,
+            Size::Triangles(count) => count as f64 / triangles as f64,
+        };
         if ratio <= 1.0 {
-            best = Some(best.map_or(cell, |best: f64| best.min(cell)));
-            if ratio > 0.93 || points > 0.8 * MOST_POINTS {
-                break;
-            }
+            best = Some(best.map_or(cell, |best| best.min(cell)));
+        }
+        if ratio <= 1.0 && ratio > CLOSE || round >= ROUNDS && best.is_some() {
+            break;
         }
         cell *= (ratio.max(0.05) * 1.02).sqrt();
     }
-    best.unwrap_or(1.1 * cell)
+    best.unwrap_or(cell)
+}
+
+/// What a cell gives.
+enum Size {
+    Triangles(usize),
+    /// The grid would have too many points. The cell should be larger by this factor.
+    TooFine(f64),
+}
+
+fn size(figure: &Figure, cell: f64) -> Size {
+    let thick = thick(figure, cell);
+    let solids = solids(&thick);
+    let field = Field::new(&thick, &solids);
+    let layers = layers(&field, cell);
+    let points: f64 = layers.iter().map(|layer| Grid::count(&field, layer, cell)).sum();
+    if points > MOST_POINTS {
+        return Size::TooFine(libm::cbrt(points / MOST_POINTS).max(1.01));
+    }
+    Size::Triangles(layers.iter().map(|layer| surface(&Grid::new(&field, layer, cell)).triangles.len()).sum())
 }
 
 /// The character with parts that are thick enough for a cell.
