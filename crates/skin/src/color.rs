@@ -11,7 +11,7 @@ const PALETTE: [[f64; 3]; 3] = [[0.79, 0.26, 0.18], [0.83, 0.62, 0.47], [0.95, 0
 /// Factors on the brightness of the same groups, for models with one color.
 const TINT: [f64; 3] = [0.86, 1.0, 1.12];
 /// Width of the border between two colors, in cells.
-const BORDER: f64 = 0.3;
+const BORDER: f64 = 0.5;
 /// Length of the rays of ambient occlusion, in cells.
 const DEPTH: f64 = 5.0;
 /// Passes of smoothing of the occlusion over the mesh.

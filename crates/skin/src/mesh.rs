@@ -50,7 +50,7 @@ pub(crate) fn cell(figure: &Figure, triangles: usize) -> f64 {
     best.unwrap_or(cell)
 }
 
-/// What a cell gives.
+/// Result of a cell size.
 enum Size {
     Triangles(usize),
     /// The grid would have too many points. The cell should be larger by this factor.

@@ -3,7 +3,7 @@
 //! MJCF models leave gaps: a head floats above the shoulders, a shin ends above the foot. A link fills the gap between
 //! two neighbors. Parallel parts, such as the capsules of a trunk, are linked over their whole length.
 
-use crate::figure::{Bone, Figure};
+use crate::figure::{Bone, Figure, Part};
 use crate::shape::{Axis, Shape, nearest_on};
 use glam::DVec3;
 
@@ -22,12 +22,22 @@ const PARALLEL_OVERLAP: f64 = 1.2;
 /// Cosine of the largest angle between parallel parts.
 const PARALLEL: f64 = 0.85;
 
+/// Radius of the neck of a ball, as a fraction of the smaller radius.
+const NECK: f64 = 0.8;
+/// Radius of a link where it meets a thinner part, as a multiple of that part's radius: shoulders are wider than arms.
+const SHOULDER: f64 = 1.2;
+/// Radii of a limb at the joint that it hangs from and at its other end, as multiples of the geom's.
+const LIMB: [f64; 2] = [1.12, 0.9];
 /// Half length of the end of a link that meets the middle of a part, as a multiple of the other part's radius.
 const SPREAD: f64 = 1.1;
 /// Cosine of the smallest angle at which a link meets the middle of a part.
 const ACROSS: f64 = 0.5;
+/// Cosine of the smallest angle between a part and a link that leaves its end along it.
+const ASKEW: f64 = 0.95;
+/// Length over which such a link slopes down to its part otherwise, as a multiple of the part's radius: shoulders slope to the neck.
+const SLOPE: f64 = 2.0;
 
-/// What a solid is there for.
+/// Purpose of a solid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Part,
@@ -65,7 +75,7 @@ impl Solid {
 /// All solids of a character: first its parts in their order, then balls and links.
 pub(crate) fn solids(figure: &Figure) -> Vec<Solid> {
     let mut solids: Vec<Solid> = (figure.parts.iter().enumerate())
-        .map(|(i, part)| Solid::new(Kind::Part, part.shape.clone(), [part.bone; 2], [i; 2]))
+        .map(|(i, part)| Solid::new(Kind::Part, tapered(figure, part), [part.bone; 2], [i; 2]))
         .collect();
     let axes: Vec<Axis> = solids.iter().map(|solid| solid.shape.axis()).collect();
     let mut more = Vec::new();
@@ -79,6 +89,21 @@ pub(crate) fn solids(figure: &Figure) -> Vec<Solid> {
     }
     solids.extend(more);
     solids
+}
+
+/// The shape of a part. Limbs become thicker at the joint that they hang from and thinner at the other end, as those of
+/// animals are.
+fn tapered(figure: &Figure, part: &Part) -> Shape {
+    let bone = &figure.bones[part.bone];
+    let Shape::Rod { ends, radii: [a, b] } = part.shape else { return part.shape.clone() };
+    let length = ends[0].distance(ends[1]);
+    let near = ends.map(|end| end.distance(bone.anchor));
+    let limb = bone.parent.is_some() && bone.turns && bone.children > 0;
+    if !limb || a != b || length < 3.0 * a || near[0].min(near[1]) > a + 0.2 * length {
+        return part.shape.clone();
+    }
+    let factors = if near[0] <= near[1] { LIMB } else { [LIMB[1], LIMB[0]] };
+    Shape::Rod { ends, radii: factors.map(|factor| factor * a) }
 }
 
 fn parts_of(figure: &Figure, bone: usize) -> Vec<usize> {
@@ -131,8 +156,14 @@ fn link(figure: &Figure, axes: &[Axis], parts: [usize; 2]) -> Option<Solid> {
             Solid::new(Kind::Link, shape, bones, parts)
         }
         None if space > -OVERLAP * small => {
-            let radii = [a.radius, b.radius].map(|r| (LINK * r).min(LINK * TAPER * small));
-            Solid::new(Kind::Link, between(&a, &b, radii), bones, parts)
+            let long = |axis: &Axis| axis.ends[0].distance(axis.ends[1]) > 0.5 * axis.radius;
+            let most = if long(&a) && long(&b) { LINK * TAPER } else { NECK };
+            let radii = [a.radius, b.radius].map(|r| (LINK * r).min(most * small));
+            let radii = match b.radius < a.radius && most > 1.0 {
+                true => [radii[0], (SHOULDER * b.radius).min(radii[0])],
+                false => radii,
+            };
+            Solid::new(Kind::Link, between(&a, &b, ends_at(figure, parts, &a, &b), radii), bones, parts)
         }
         _ => return None,
     };
@@ -144,24 +175,46 @@ fn link(figure: &Figure, axes: &[Axis], parts: [usize; 2]) -> Option<Solid> {
     Some(solid)
 }
 
-/// A rod between two parts. Where the end of one meets the middle of the other, it spreads there, as an ankle does over a foot.
-fn between(a: &Axis, b: &Axis, radii: [f64; 2]) -> Shape {
-    let [p, q] = closest(a.ends, b.ends);
-    let spread = |axis: &Axis, at: DVec3, other: &Axis| {
+/// Ends of a link: the nearest points of both axes, or those nearest to the joint if the lower part begins there, as an arm
+/// does at the shoulder.
+fn ends_at(figure: &Figure, parts: [usize; 2], a: &Axis, b: &Axis) -> [DVec3; 2] {
+    let [above, below] = parts.map(|part| figure.parts[part].bone);
+    let joint = figure.bones[below].anchor;
+    let on = |axis: &Axis, p: DVec3| axis.ends[0].lerp(axis.ends[1], nearest_on(axis.ends[0], axis.ends[1], p));
+    let start = on(b, joint);
+    if above == below || !figure.bones[below].turns || start.distance(joint) > b.radius {
+        return closest(a.ends, b.ends);
+    }
+    [on(a, start), start]
+}
+
+/// A link between two parts. Where the end of one meets the middle of the other, it spreads there, as an ankle does over a foot.
+fn between(a: &Axis, b: &Axis, [p, q]: [DVec3; 2], radii: [f64; 2]) -> Shape {
+    let spread = |axis: &Axis, at: DVec3, other: &Axis, reach: f64| {
         let length = axis.ends[0].distance(axis.ends[1]);
         let way = (axis.ends[1] - axis.ends[0]).normalize_or_zero();
+        // a ball, such as a head, has a round neck
+        if other.ends[0] == other.ends[1] {
+            return [at; 2];
+        }
         let place = (at - axis.ends[0]).dot(way);
-        let reach = SPREAD * other.radius;
         [place - reach, place + reach].map(|x| axis.ends[0] + x.clamp(0.0, length) * way)
     };
-    let across = |axis: &Axis| {
-        let way = (axis.ends[1] - axis.ends[0]).normalize_or_zero();
-        let link = (q - p).normalize_or_zero();
-        way != DVec3::ZERO && way.dot(link).abs() < ACROSS
+    // cosine of the angle between a part and the link; 1 for a ball
+    let angle = |axis: &Axis| {
+        let way = (axis.ends[1] - axis.ends[0]).normalize_or(q - p);
+        way.dot((q - p).normalize_or_zero()).abs()
     };
-    match (across(a), across(b)) {
-        (false, true) => Shape::Sheet { from: [p; 2], to: spread(b, q, a), radii },
-        (true, false) => Shape::Sheet { from: spread(a, p, b), to: [q; 2], radii },
+    match (angle(a), angle(b)) {
+        (x, _) if (ACROSS..ASKEW).contains(&x) && b.radius < a.radius => {
+            Shape::Sheet { from: spread(a, p, b, SLOPE * a.radius), to: [q; 2], radii }
+        }
+        (x, y) if x >= ACROSS && y < ACROSS => {
+            Shape::Sheet { from: [p; 2], to: spread(b, q, a, SPREAD * a.radius), radii }
+        }
+        (x, y) if x < ACROSS && y >= ACROSS => {
+            Shape::Sheet { from: spread(a, p, b, SPREAD * b.radius), to: [q; 2], radii }
+        }
         _ => Shape::Rod { ends: [p, q], radii },
     }
 }
