@@ -27,8 +27,13 @@ pub enum CliError {
     #[error(transparent)]
     Render(#[from] RenderError),
     /// An error of a skin.
-    #[error(transparent)]
-    Skin(#[from] SkinError),
+    #[error("{model}: {source}")]
+    Skin {
+        /// The model as the command line names it.
+        model: String,
+        /// Names the model's parts.
+        source: SkinError,
+    },
     /// A rollout process is lost. The learned policy is saved.
     #[error("{cause}\n{advice}")]
     Lost {

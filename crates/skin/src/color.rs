@@ -2,6 +2,7 @@
 
 use crate::field::Field;
 use crate::figure::Figure;
+use crate::layer::Layer;
 use crate::mesh::Piece;
 use crate::solid::Kind;
 use glam::DVec3;
@@ -58,13 +59,14 @@ pub(crate) fn of_piece(field: &Field, parts: &[DVec3], piece: &Piece, cell: f64)
         };
         open = (0..open.len()).map(mean).collect();
     }
-    points.zip(open).map(|(p, open)| open * base(field, parts, *p, cell)).collect()
+    points.zip(open).map(|(p, open)| open * base(field, &piece.layer, parts, *p, cell)).collect()
 }
 
 /// Linear RGB of a point of the surface.
-fn base(field: &Field, parts: &[DVec3], p: DVec3, cell: f64) -> DVec3 {
+fn base(field: &Field, layer: &Layer, parts: &[DVec3], p: DVec3, cell: f64) -> DVec3 {
     let mut near: Vec<(f64, DVec3)> = Vec::new();
-    for solid in field.solids.iter().filter(|solid| solid.kind != Kind::Ball) {
+    let solids = layer.solids.iter().map(|(i, _)| &field.solids[*i]);
+    for solid in solids.filter(|solid| solid.kind != Kind::Ball) {
         if solid.bounds.0.distance(p) - solid.bounds.1 < 2.0 * field.widest + 2.0 * cell {
             let sample = solid.shape.sample(p);
             let [from, to] = solid.parts.map(|part| parts[part]);

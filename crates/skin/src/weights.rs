@@ -58,15 +58,15 @@ fn near(field: &Field, layer: &Layer, p: DVec3, cell: f64) -> (usize, Vec<f64>) 
             }
         }
     }
-    let owned = |bone: &usize| layer.bones[*bone];
-    let first =
-        (0..figure.bones.len()).filter(owned).min_by(|a, b| nearest[*a].0.total_cmp(&nearest[*b].0)).unwrap_or(0);
+    // a limb with a surface of its own also follows the body that it hangs from
+    let top = layer.bones.iter().position(|own| *own).unwrap_or(0);
+    let related = |bone: usize| layer.bones[bone] || figure.up(top).any(|at| at == bone);
+    let bones = (0..figure.bones.len()).filter(|bone| related(*bone));
+    let first = bones.min_by(|a, b| nearest[*a].0.total_cmp(&nearest[*b].0)).unwrap_or(0);
     let (least, radius) = nearest[first];
     let weight = |bone: usize| {
         let (distance, own) = nearest[bone];
-        // a limb with a surface of its own also follows the body that it hangs from
-        let related = layer.bones[bone] || figure.up(first).any(|at| at == bone);
-        if distance.is_infinite() || !related || figure.between(first, bone) > REACH {
+        if distance.is_infinite() || !related(bone) || figure.between(first, bone) > REACH {
             return f64::from(bone == first);
         }
         let soft = SOFTNESS * radius.min(own).max(0.5 * cell);

@@ -142,3 +142,25 @@ fn a_bent_knee_moves_the_shin_only() {
     }
     assert!(still > 1000 && swung > 300, "{still} {swung}");
 }
+
+/// Both legs of Gymnasium's walker are in the same place at rest. No vertex follows both.
+#[test]
+fn legs_in_one_place_move_apart() {
+    let (_, model) =
+        models().into_iter().find(|(name, _)| name.ends_with("gymnasium/walker2d.xml")).expect("the model");
+    let skin = skin(&model, &Options::default()).expect("a skin");
+    let mut seen = [0, 0];
+    for (joints, weights) in skin.joints.iter().zip(&skin.weights) {
+        let follows = |left: bool| {
+            let leg = |joint: &u8| {
+                let name = &skin.skeleton[usize::from(*joint)].name;
+                name != "torso" && name.ends_with("_left") == left
+            };
+            joints.iter().zip(weights).any(|(joint, weight)| *weight > 0 && leg(joint))
+        };
+        let sides = [follows(false), follows(true)];
+        assert_ne!(sides, [true; 2], "{joints:?} {weights:?}");
+        (0..2).for_each(|i| seen[i] += usize::from(sides[i]));
+    }
+    assert!(seen.iter().all(|count| *count > 500), "{seen:?}");
+}

@@ -21,7 +21,8 @@ pub fn run(args: &SkinArgs, json: bool) -> Result<(), CliError> {
     }
     output::check(&args.out, &["glb"], &[&args.model])?;
     let model = model::load(&args.model)?;
-    let skin = skin(&model, &Options { triangles: args.triangles })?;
+    let skin = skin(&model, &Options { triangles: args.triangles })
+        .map_err(|source| CliError::Skin { model: args.model.clone(), source })?;
     let bytes = skin.to_glb();
     write_atomic(&args.out, &bytes)?;
     let (joints, vertices, triangles) = (skin.skeleton.len(), skin.positions.len(), skin.triangles.len());
