@@ -102,7 +102,7 @@ fn openness(field: &Field, p: DVec3, normal: DVec3, depth: f64) -> f64 {
     (1.0 - 1.1 * hidden / whole).clamp(DARKEST, 1.0)
 }
 
-/// The group of a part: the trunk is the root and what has several limbs or hangs in the middle of one, ends are heads,
+/// The group of a part: the trunk is the root and bodies with several others below them, ends are the last bodies: heads,
 /// hands and feet.
 fn group(figure: &Figure, part: usize) -> Group {
     let here = &figure.parts[part];
@@ -111,7 +111,6 @@ fn group(figure: &Figure, part: usize) -> Group {
     if here.bone > 0 && !below(here.bone) {
         return Group::End;
     }
-    // a part that hangs beside the others of the root, such as a head
     match here.bone == 0 || bone.children > 1 {
         true => Group::Trunk,
         false => Group::Limb,
