@@ -14,6 +14,7 @@ GROUPS = {
     "Evaluate and show": ("eval", "bench", "render", "play", "list"),
     "Convert": ("export", "import", "record-demo"),
     "Motion clips": ("motion",),
+    "Skins": ("skin",),
 }
 """Commands by their purpose; others follow under "Other commands"."""
 NOT_BUILT = ("play",)

@@ -68,6 +68,8 @@ pub enum Command {
     Config(ConfigCommand),
     /// Import, retarget, check and render motion clips.
     Motion(MotionArgs),
+    /// Generate a skin for a character: a smooth glTF mesh that follows its bodies.
+    Skin(SkinArgs),
     /// Measure the speed of physics, environments and training.
     Bench(BenchArgs),
     /// Inspect this computer: processor, instruction set, speed, Python, ffmpeg, game, and what is missing.
@@ -301,6 +303,28 @@ pub struct RecordDemoArgs {
     /// Seed of the environments.
     #[arg(long, value_name = "S", default_value_t = marathon_learn::EvalOptions::default().seed)]
     pub seed: u64,
+}
+
+const SKIN_HELP: &str = "\
+The skin is one smooth surface around the geoms of the model's character, with a joint for each body. Its colors are the \
+model's, or one for each group of bodies. `marathon play` and the Bevy plugin wear it without a mapping.
+
+  marathon skin ant --out ant.glb
+  marathon play ant --skin ant.glb";
+
+/// Options of `skin`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = SKIN_HELP)]
+pub struct SkinArgs {
+    /// Character: an agent, such as MarathonMan, or an MJCF file (.xml).
+    #[arg(value_name = "MODEL")]
+    pub model: String,
+    /// File to write (.glb).
+    #[arg(long, value_name = "F.glb")]
+    pub out: PathBuf,
+    /// Largest number of triangles, 500 to 20000.
+    #[arg(long, value_name = "N", default_value_t = marathon_skin::Options::default().triangles)]
+    pub triangles: usize,
 }
 
 /// Options of `play`.

@@ -8,6 +8,7 @@ use marathon_motion::MotionError;
 use marathon_physics::mjcf::MjcfError;
 use marathon_render::RenderError;
 use marathon_runs::RunError;
+use marathon_skin::SkinError;
 use std::path::Path;
 
 /// An error with a text for the user: which file or option, what was found, what was expected.
@@ -25,6 +26,14 @@ pub enum CliError {
     /// An error of a picture.
     #[error(transparent)]
     Render(#[from] RenderError),
+    /// An error of a skin.
+    #[error("{model}: {source}")]
+    Skin {
+        /// The model as the command line names it.
+        model: String,
+        /// Names the model's parts.
+        source: SkinError,
+    },
     /// A rollout process is lost. The learned policy is saved.
     #[error("{cause}\n{advice}")]
     Lost {

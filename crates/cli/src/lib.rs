@@ -74,6 +74,7 @@ fn dispatch(args: &Args) -> Result<(), CliError> {
         Command::Config(command) => commands::config::run(command, args.json),
         Command::RolloutWorker => commands::rollout_worker::run(),
         Command::Motion(what) => motion::run(what, args.json),
+        Command::Skin(skin) => commands::skin::run(skin, args.json),
         Command::Doctor => commands::doctor::run(args.json),
         Command::Completions { shell } => {
             commands::completions::run(*shell);

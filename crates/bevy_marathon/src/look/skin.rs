@@ -1,7 +1,7 @@
 //! Skins: a glTF character with a skeleton that a ragdoll wears in place of its shapes.
 //!
-//! A mapping assigns bones to bodies, as for the import of motions. The mappings that come with Marathon include the
-//! bone names of many tools. A bone turns as its body does, and keeps its length. The whole skin is scaled so that its
+//! A mapping assigns bones to bodies, as for the import of motions. A skin that was generated for the model needs none: its
+//! bones are the model's bodies. The mappings that come with Marathon include the bone names of many tools. A bone turns as its body does, and keeps its length. The whole skin is scaled so that its
 //! legs are as long as the ragdoll's.
 
 use crate::axes::{to_game, to_physics};
@@ -44,7 +44,8 @@ impl Plugin for SkinPlugin {
 pub struct Skin {
     /// A scene with a skinned mesh, such as `GltfAssetLabel::Scene(0).from_asset("hero.glb")`. Its lights and cameras are left out.
     pub scene: Handle<WorldAsset>,
-    /// Text of a mapping file: which bone follows which body. `None`: the mapping that comes with Marathon for the model.
+    /// Text of a mapping file: which bone follows which body. `None`: bones that are the model's own follow their bodies, others
+    /// follow the mapping that comes with Marathon for the model.
     pub mapping: Option<Cow<'static, str>>,
 }
 
@@ -234,7 +235,10 @@ fn fitted(tree: &[Node], anatomy: &Anatomy, skin: &Skin) -> Result<(SkeletonPose
     let (path, model) = (Path::new("skin"), &*anatomy.model);
     let mapping = match &skin.mapping {
         Some(text) => Mapping::parse(path, text.as_bytes(), &skeleton, model).map_err(SkinError::Mapping),
-        None => Mapping::built_in(path, &skeleton, model).map_err(SkinError::UnknownBones),
+        None => match Mapping::own(&skeleton, model) {
+            Some(own) => Ok(own),
+            None => Mapping::built_in(path, &skeleton, model).map_err(SkinError::UnknownBones),
+        },
     };
     let poser = SkeletonPoser::new(model, &mapping?, &skeleton);
     Ok((poser, above, bones))

@@ -12,4 +12,5 @@ pub mod play;
 pub mod record_demo;
 pub mod render;
 pub mod rollout_worker;
+pub mod skin;
 pub mod train;

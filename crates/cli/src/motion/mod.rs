@@ -1,7 +1,7 @@
 //! `marathon motion`: converts recordings of people to clips of a character, and checks and draws clips.
 
 mod import;
-mod model;
+pub mod model;
 mod policy;
 mod show;
 

@@ -10,6 +10,7 @@ mod balance;
 mod band;
 mod fit;
 mod mapping;
+mod own;
 mod problem;
 mod skeleton_poser;
 mod target;
