@@ -272,6 +272,8 @@ def test_a_run_may_start_from_a_policy(tmp_path: Path) -> None:
 def test_progress_is_shown_unless_it_is_not_wanted(capfd: pytest.CaptureFixture[str]) -> None:
     config = copy.deepcopy(FOREIGN)
     config["behaviors"]["Hopper"]["summary_freq"] = 1024
+    # it has no effect, which is a warning
+    del config["behaviors"]["Hopper"]["threaded"]
     train("Hopper-v0", config, seed=3, threads=2)
     text = capfd.readouterr().err
     assert "4,096 of 4,096 steps" in text, text

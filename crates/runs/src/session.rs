@@ -274,8 +274,19 @@ impl Session {
             train_with(players, &**factory, Isa::best(), &run.config, resume, observer)
         };
         let Some(folder) = &self.folder else {
-            let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| watch(stats);
-            return Ok(train(resume, &mut observer)?);
+            let (total, done) = (run.config.run.total_steps, resume.as_ref().map_or(0, Checkpoint::steps));
+            let mut shown = show.then(|| crate::report::Progress::new(total, done, run.summary_freq));
+            let mut observer = |stats: &IterationStats, _: &Snapshot<'_>| {
+                if let Some(shown) = &mut shown {
+                    shown.update(stats);
+                }
+                watch(stats)
+            };
+            let output = train(resume, &mut observer);
+            if let Some(shown) = &shown {
+                shown.finish();
+            }
+            return Ok(output?);
         };
         let terms = &factory.spec().reward_terms;
         let mut reporter = Reporter::new(folder, run, terms, resume.as_ref(), (show, watch))?;

@@ -13,7 +13,7 @@ use crate::folder::{POLICIES, RunFolder};
 use crate::run_file::RunFile;
 use csv::CsvLog;
 use marathon_learn::{Checkpoint, Control, IterationStats, Observer, Policy, Snapshot, TrainOutput};
-use progress::Progress;
+pub(crate) use progress::Progress;
 use std::path::{Path, PathBuf};
 use tensorboard::EventLog;
 
