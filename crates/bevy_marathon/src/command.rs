@@ -93,6 +93,11 @@ impl AgentCommand {
     pub fn ranges(&self) -> &[CommandRange] {
         &self.ranges
     }
+
+    /// The same, to keep while the numbers are set.
+    pub(crate) fn shared_ranges(&self) -> Arc<[CommandRange]> {
+        self.ranges.clone()
+    }
 }
 
 #[cfg(test)]

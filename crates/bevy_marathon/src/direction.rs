@@ -152,7 +152,7 @@ pub(crate) fn follow(
     mut ragdolls: Query<(&mut MoveDirection, &mut AgentCommand, &RagdollState, &Anatomy, &Transform)>,
 ) {
     for (mut movement, mut command, key, anatomy, track) in &mut ragdolls {
-        let ranges = command.ranges().to_vec();
+        let ranges = command.shared_ranges();
         let Some((steered, sample)) = Steered::of(&ranges).zip(marathon.history(key).and_then(|h| h.back())) else {
             continue;
         };

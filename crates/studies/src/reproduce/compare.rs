@@ -11,7 +11,7 @@ const TOLERANCE: f64 = 0.05;
 const LISTED: usize = 6;
 
 /// The outcome of a comparison.
-#[derive(Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Change {
     /// Nothing changed.
     None,

@@ -203,14 +203,16 @@ impl<'a> Place<'a> {
             Ok::<(), StudyError>(())
         };
         if recipe.study().is_some() {
-            for ending in ["csv", "md", "png"] {
+            let files = |ending: &str| {
                 let name = format!("{}.{ending}", recipe.name);
-                let (new, old) = (folder.join(&name), Path::new("docs/studies").join(&name));
-                // the page has the table, and names of processors; the picture shows the table
-                let change = compare::tables(&new.with_extension("csv"), &old.with_extension("csv"))?;
-                if ending == "csv" || update {
-                    add(new, old, change)?;
-                }
+                (folder.join(&name), Path::new("docs/studies").join(name))
+            };
+            let (new, old) = files("csv");
+            let change = compare::tables(&new, &old)?;
+            add(new, old, change.clone())?;
+            // the page and the picture show the table
+            for (new, old) in ["md", "png"].map(files).into_iter().filter(|_| update) {
+                add(new, old, change.clone())?;
             }
             return Ok(rows);
         }
