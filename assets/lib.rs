@@ -9,6 +9,9 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+/// A list of files, beside the file that names them: path and content.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! files {
     ($($path:literal),* $(,)?) => {
         &[$(($path, include_bytes!($path))),*]
@@ -67,10 +70,7 @@ pub const FILES: &[(&str, &[u8])] = files![
 /// # Panics
 /// If there is no such file.
 pub const fn text(path: &str) -> &'static str {
-    match core::str::from_utf8(find(FILES, path)) {
-        Ok(text) => text,
-        Err(_) => panic!("this file is not text"),
-    }
+    find_text(FILES, path)
 }
 
 /// The bytes of a file. In a constant, a path that does not exist is an error of the compiler.
@@ -94,6 +94,17 @@ pub const fn find(files: &[(&str, &'static [u8])], path: &str) -> &'static [u8] 
         i += 1;
     }
     panic!("no file has this path")
+}
+
+/// The same as text.
+///
+/// # Panics
+/// If there is no such file, or it is not text.
+pub const fn find_text(files: &[(&str, &'static [u8])], path: &str) -> &'static str {
+    match core::str::from_utf8(find(files, path)) {
+        Ok(text) => text,
+        Err(_) => panic!("this file is not text"),
+    }
 }
 
 /// `a == b`, for constants.

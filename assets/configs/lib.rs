@@ -9,14 +9,8 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-macro_rules! files {
-    ($($path:literal),* $(,)?) => {
-        &[$(($path, include_bytes!($path))),*]
-    };
-}
-
 /// All files: path and content.
-pub const FILES: &[(&str, &[u8])] = files![
+pub const FILES: &[(&str, &[u8])] = marathon_assets::files![
     "ant-fast.yaml",
     "ant_controller-fast.yaml",
     "ant_controller-steady.yaml",
@@ -47,10 +41,7 @@ pub const FILES: &[(&str, &[u8])] = files![
 /// # Panics
 /// If there is no such file.
 pub const fn text(name: &str) -> &'static str {
-    match core::str::from_utf8(marathon_assets::find(FILES, name)) {
-        Ok(text) => text,
-        Err(_) => panic!("this file is not text"),
-    }
+    marathon_assets::find_text(FILES, name)
 }
 
 #[cfg(test)]

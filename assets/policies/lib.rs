@@ -9,14 +9,8 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-macro_rules! files {
-    ($($path:literal),* $(,)?) => {
-        &[$(($path, include_bytes!($path))),*]
-    };
-}
-
 /// All files: path and content.
-pub const FILES: &[(&str, &[u8])] = files![
+pub const FILES: &[(&str, &[u8])] = marathon_assets::files![
     "ant.safetensors",
     "AntController.safetensors",
     "hopper.safetensors",
