@@ -34,6 +34,7 @@ cargo fmt --all --check
 "$MARATHON_PYTHON" tests/prose/check.py
 if [ -n "$game" ]; then
   tests/types.sh
+  tests/lanes/run.sh
 fi
 # lints and checks documentation while it compiles
 export RUSTC_WORKSPACE_WRAPPER="$PWD/tests/lint.sh"

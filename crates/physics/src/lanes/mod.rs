@@ -9,18 +9,41 @@
 //! [`Real::enter`], which runs a [`Kernel`] inside a function compiled for the right instruction set. Everything a
 //! kernel calls must be `#[inline(always)]`.
 
+#[cfg(any(vectors = "sse2", vectors = "simd128"))]
+mod emulated;
+#[cfg(not(vectors = "none"))]
+mod four;
 pub mod math;
+#[cfg(vectors = "neon")]
+mod neon;
+#[cfg(any(vectors = "none", test))]
 mod portable;
 mod scalar;
+#[cfg(vectors = "sse2")]
+mod sse2;
+#[cfg(any(vectors = "simd128", vectors = "relaxed"))]
+mod wasm;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
+#[cfg(not(vectors = "none"))]
+pub use four::{F32x4, fuses};
+#[cfg(vectors = "none")]
 pub use portable::F32x4;
 #[cfg(target_arch = "x86_64")]
 pub use x86::{F32x8, F32x16};
+
+#[cfg(vectors = "neon")]
+use {neon as fused, neon as vector};
+#[cfg(vectors = "sse2")]
+use {emulated as fused, sse2 as vector};
+#[cfg(vectors = "simd128")]
+use {emulated as fused, wasm as vector};
+#[cfg(vectors = "relaxed")]
+use {wasm as fused, wasm as vector};
 
 /// Lanes of the widest backend.
 pub const MAX_LANES: usize = 16;
@@ -239,7 +262,8 @@ pub enum Isa {
     F64,
     /// One `f32` lane.
     F32,
-    /// Four `f32` lanes without special instructions. On x86-64 it needs the feature `baseline`.
+    /// Four `f32` lanes in the 128-bit vectors that every processor of the platform has. On x86-64, which has no fused
+    /// multiply-add there, it needs the feature `baseline`.
     X4,
     /// Eight lanes, AVX2 and FMA.
     X8,
@@ -251,11 +275,11 @@ impl Isa {
     /// All of them, narrowest first.
     pub const ALL: [Isa; 5] = [Isa::F64, Isa::F32, Isa::X4, Isa::X8, Isa::X16];
 
-    /// The fastest one that this processor supports. Without hardware for fused vector products, one lane at a time is
-    /// faster than four that emulate them.
+    /// The fastest one that this processor supports. Four lanes in plain arrays are slower than one.
     pub fn best() -> Isa {
-        let narrow = if cfg!(target_arch = "aarch64") { Isa::X4 } else { Isa::F32 };
-        *[Isa::X16, Isa::X8].iter().find(|isa| isa.supported()).unwrap_or(&narrow)
+        let vectors = [Isa::X16, Isa::X8, Isa::X4];
+        let fast = vectors.into_iter().find(|isa| isa.supported() && (*isa != Isa::X4 || cfg!(not(vectors = "none"))));
+        fast.unwrap_or(Isa::F32)
     }
     /// Number of agents per group.
     pub fn lanes(self) -> usize {
@@ -271,7 +295,7 @@ impl Isa {
         match self {
             Isa::F64 => f64::supported(),
             Isa::F32 => f32::supported(),
-            Isa::X4 => cfg!(any(not(target_arch = "x86_64"), feature = "baseline")),
+            Isa::X4 => cfg!(without_fma),
             #[cfg(target_arch = "x86_64")]
             Isa::X8 => F32x8::supported(),
             #[cfg(target_arch = "x86_64")]
@@ -312,15 +336,15 @@ impl std::str::FromStr for Isa {
 }
 
 /// Runs a block for [`Isa::X4`] where its kernels are compiled.
-#[cfg(any(not(target_arch = "x86_64"), feature = "baseline"))]
+#[cfg(without_fma)]
 #[doc(hidden)]
 #[macro_export]
 macro_rules! with_baseline {
     ($($body:tt)*) => {{ $($body)* }};
 }
 
-/// The same: no x86-64 processor is fastest with these kernels, which would take a fifth of the time to compile.
-#[cfg(not(any(not(target_arch = "x86_64"), feature = "baseline")))]
+/// The same: the processor of this build has wider vectors, and these kernels would take a fifth of the time to compile.
+#[cfg(not(without_fma))]
 #[doc(hidden)]
 #[macro_export]
 macro_rules! with_baseline {

@@ -1,4 +1,4 @@
-//! Four lanes in plain arrays, for processors without AVX2 and for the web.
+//! Four lanes in plain arrays, for processors without known vectors.
 
 use super::{Kernel, Real, assign_ops};
 use std::ops::{Add, AddAssign, Mul, MulAssign, Neg, Sub, SubAssign};
@@ -32,9 +32,6 @@ fn fused(a: f32, b: f32, c: f32) -> f32 {
 fn fused4(a: &[f32; 4], b: &[f32; 4], c: &[f32; 4]) -> [f32; 4] {
     [fused(a[0], b[0], c[0]), fused(a[1], b[1], c[1]), fused(a[2], b[2], c[2]), fused(a[3], b[3], c[3])]
 }
-
-/// Whether the target has the instruction in every processor.
-const HARDWARE: bool = cfg!(any(target_feature = "fma", target_arch = "aarch64"));
 
 macro_rules! lanewise {
     (|$($x:ident),*| $e:expr) => {{
@@ -96,7 +93,7 @@ impl Real for F32x4 {
     type Mask = [bool; 4];
     const LANES: usize = 4;
     const EPSILON: f64 = f32::EPSILON as f64;
-    const ISA: &'static str = "baseline";
+    const ISA: &'static str = "portable";
 
     fn supported() -> bool {
         true
@@ -135,8 +132,7 @@ impl Real for F32x4 {
     }
     #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
-        let a = self;
-        if HARDWARE { lanewise!(|a, b, c| a.mul_add(b, c)) } else { F32x4(fused4(&a.0, &b.0, &c.0)) }
+        F32x4(fused4(&self.0, &b.0, &c.0))
     }
     #[inline(always)]
     fn neg_mul_add(self, b: Self, c: Self) -> Self {
@@ -236,34 +232,5 @@ impl Real for F32x4 {
     #[inline(always)]
     fn from_bits(bits: u32) -> [bool; 4] {
         [bits & 1 != 0, bits & 2 != 0, bits & 4 != 0, bits & 8 != 0]
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::fused;
-
-    /// The emulation equals the correctly rounded result, on easy, cancelling, tiny and special arguments.
-    #[test]
-    fn emulated_fma_is_exact() {
-        let mut state = 1u64;
-        let mut next = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (state >> 32) as u32
-        };
-        for i in 0..2_000_000 {
-            let (a, b, mut c) = (f32::from_bits(next()), f32::from_bits(next()), f32::from_bits(next()));
-            if i % 3 == 0 {
-                c = -(a * b); // cancellation leaves only the rounding error of the product
-            }
-            if i % 7 == 0 {
-                c *= f32::EPSILON;
-            }
-            let (got, want) = (fused(a, b, c), a.mul_add(b, c));
-            assert!(
-                got.to_bits() == want.to_bits() || (got.is_nan() && want.is_nan()),
-                "{a} * {b} + {c}: {got} != {want}"
-            );
-        }
     }
 }

@@ -88,7 +88,8 @@ fn backends_agree_bit_for_bit() {
             }
         }
     };
-    check(probe::<F32x4>(), "baseline");
+    check(probe::<F32x4>(), F32x4::ISA);
+    check(probe::<portable::F32x4>(), "portable");
     #[cfg(target_arch = "x86_64")]
     {
         if F32x8::supported() {
@@ -141,6 +142,7 @@ fn rearranging_moves_every_lane() {
     }
     turn::<f32>();
     turn::<F32x4>();
+    turn::<portable::F32x4>();
     #[cfg(target_arch = "x86_64")]
     {
         turn::<F32x8>();
@@ -158,9 +160,58 @@ fn sums_do_not_depend_on_width() {
     }
     let want = total::<f32>(x);
     assert_eq!(total::<F32x4>(x), want);
+    assert_eq!(total::<portable::F32x4>(x), want);
     #[cfg(target_arch = "x86_64")]
     {
         assert!(!F32x8::supported() || total::<F32x8>(x) == want);
         assert!(!F32x16::supported() || total::<F32x16>(x) == want);
     }
+}
+
+/// Products of easy, cancelling, tiny, halfway and special arguments are rounded once in all four lanes.
+fn products_are_fused<T: Real<Scalar = f32>>() {
+    struct Products<T>(std::marker::PhantomData<T>);
+    impl<T: Real<Scalar = f32>> Kernel<T> for Products<T> {
+        type Output = ();
+        fn run(self) {
+            let mut state = 1u64;
+            let mut next = || {
+                state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+                (state >> 32) as u32
+            };
+            let (mut a, mut b, mut c) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+            for round in 0..250_000 {
+                for i in 0..4 {
+                    // few significant bits give sums halfway between two numbers
+                    let mask = [u32::MAX, u32::MAX, 0xffff_f000, 0xffff_0000][(round + i) % 4];
+                    [a[i], b[i]] = [next(), next()].map(|x| f32::from_bits(x & mask));
+                    c[i] = match (round + i) % 5 {
+                        // cancellation leaves only the rounding error of the product
+                        0 => -(a[i] * b[i]),
+                        1 => a[i] * b[i] * f32::EPSILON,
+                        2 => a[i] * b[i] * 0.5 * f32::EPSILON,
+                        _ => f32::from_bits(next() & mask),
+                    };
+                }
+                let (x, y, z) = (T::load(&a), T::load(&b), T::load(&c));
+                let (sum, difference) = (x.mul_add(y, z), x.neg_mul_add(y, z));
+                for i in 0..4 {
+                    let want = [a[i].mul_add(b[i], c[i]), (-a[i]).mul_add(b[i], c[i])];
+                    for (got, want) in [sum.get(i), difference.get(i)].into_iter().zip(want) {
+                        let same = got.to_bits() == want.to_bits() || got.is_nan() && want.is_nan();
+                        assert!(same, "{}: {:e} * {:e} + {:e}: {got:e} != {want:e}", T::ISA, a[i], b[i], c[i]);
+                    }
+                }
+            }
+        }
+    }
+    T::enter(Products::<T>(std::marker::PhantomData));
+}
+
+#[test]
+fn multiply_add_rounds_once() {
+    products_are_fused::<F32x4>();
+    products_are_fused::<portable::F32x4>();
+    #[cfg(not(vectors = "none"))]
+    assert!(fuses());
 }
