@@ -4,7 +4,7 @@ use crate::bench::options::{cores, isas};
 use crate::commands::play;
 use crate::error::CliError;
 use marathon_envs::registry;
-use marathon_physics::lanes::Isa;
+use marathon_physics::lanes::{F32x4, Isa, Real};
 use marathon_runs::python;
 use marathon_runs::speed::{env_speed, median};
 use marathon_runs::terminal::{print_json, say};
@@ -74,7 +74,8 @@ fn processor() -> String {
 fn instruction_sets() -> Finding {
     let best = Isa::best();
     let known: Vec<&str> = isas(&[]).into_iter().map(Isa::name).collect();
-    let found = format!("{} ({} agents at a time); available: {}", best.name(), best.lanes(), known.join(", "));
+    let vectors = if best == Isa::X4 { format!("{}, ", <F32x4 as Real>::ISA) } else { String::new() };
+    let found = format!("{} ({vectors}{} agents at a time); available: {}", best.name(), best.lanes(), known.join(", "));
     Finding { name: "instruction set", found, missing: best.obstacle().unwrap_or_default().into() }
 }
 

@@ -21,6 +21,9 @@ pub type RowsMut<'a, S> = &'a mut [[S; BLOCK]];
 /// Maximum rows of a tile. With four columns of AVX-512 they fill 24 of 32 registers.
 const ROWS: usize = 6;
 
+/// Lane counts whose kernels have 32 registers, and room for four columns: AVX-512, and NEON. One lane is a row of blocks.
+const FOUR_COLUMNS: &[usize] = if cfg!(target_arch = "aarch64") { &[1, 4, 16] } else { &[1, 16] };
+
 /// Splits `n` into tiles of at most `max` that are as equal as possible. Returns the size of the next one.
 #[inline(always)]
 fn next_tile(n: usize, max: usize) -> usize {
@@ -197,7 +200,7 @@ macro_rules! by_columns {
     ($blocks:expr, $f:ident, $($arg:expr),*) => {{
         let n = $blocks * (BLOCK / T::LANES);
         let mut c = 0;
-        if T::LANES != 8 {
+        if FOUR_COLUMNS.contains(&T::LANES) {
             while c + 4 <= n {
                 $f::<T, 4>($($arg,)* c);
                 c += 4;
