@@ -75,7 +75,8 @@ fn instruction_sets() -> Finding {
     let best = Isa::best();
     let known: Vec<&str> = isas(&[]).into_iter().map(Isa::name).collect();
     let vectors = if best == Isa::X4 { format!("{}, ", <F32x4 as Real>::ISA) } else { String::new() };
-    let found = format!("{} ({vectors}{} agents at a time); available: {}", best.name(), best.lanes(), known.join(", "));
+    let found =
+        format!("{} ({vectors}{} agents at a time); available: {}", best.name(), best.lanes(), known.join(", "));
     Finding { name: "instruction set", found, missing: best.obstacle().unwrap_or_default().into() }
 }
 
