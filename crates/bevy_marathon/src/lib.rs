@@ -55,6 +55,7 @@ mod command;
 mod direction;
 mod error;
 mod ground;
+mod lod;
 #[cfg(feature = "render")]
 pub mod look;
 mod marathon;
@@ -62,6 +63,7 @@ mod plugin;
 pub mod pose;
 mod ragdoll;
 mod simulate;
+mod snapshot;
 
 pub use asset::{PolicyAsset, RagdollPrefab};
 pub use characters::{PoseSample, spec_of_role};
@@ -69,9 +71,11 @@ pub use command::AgentCommand;
 pub use direction::MoveDirection;
 pub use error::{CommandError, RagdollError};
 pub use ground::{Ground, TRACK_HALF_WIDTH};
+pub use lod::{Lod, LodByDistance};
 pub use marathon::{Marathon, RagdollState};
 pub use plugin::{MarathonPlugin, MarathonSystems};
 pub use ragdoll::*;
+pub use snapshot::{MarathonSnapshot, RagdollSnapshot, SnapshotError};
 
 /// The names that most apps need.
 pub mod prelude {
@@ -83,8 +87,8 @@ pub mod prelude {
     pub use crate::plugin::{MarathonPlugin, MarathonSystems};
     pub use crate::ragdoll::*;
     pub use crate::{
-        AgentCommand, CommandError, Ground, Marathon, MoveDirection, PolicyAsset, RagdollError, RagdollPrefab,
-        RagdollState,
+        AgentCommand, CommandError, Ground, Lod, LodByDistance, Marathon, MarathonSnapshot, MoveDirection, PolicyAsset,
+        RagdollError, RagdollPrefab, RagdollSnapshot, RagdollState, SnapshotError,
     };
     pub use marathon_physics::Variation;
     pub use marathon_runs::TaskConfig;

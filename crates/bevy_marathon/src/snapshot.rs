@@ -1,0 +1,239 @@
+//! Snapshots of ragdolls: for rollback, saved games, and peers that join later.
+
+use crate::characters::{KindIdentity, LaneState, Slot};
+use crate::marathon::{Marathon, RagdollState};
+use marathon_envs::EnvError;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Duration;
+use thiserror::Error;
+
+/// Mark of the bytes of a snapshot. The last two digits are the version.
+const MARK: &[u8; 8] = b"MRTHNr01";
+
+/// A whole ragdoll at a decision: its physics with the warm start of the solver, the phase and the memory of its task, its
+/// command and the schedule of commands, its random streams, its episode, pushes that still act, whether it
+/// [sleeps](crate::Lod::Asleep), and the poses that frames are drawn between. From [`Marathon::save`].
+///
+/// What the components of the ragdoll say is not part of it: [`Controls`](crate::Controls), [`AgentCommand`](crate::AgentCommand),
+/// [`MoveDirection`](crate::MoveDirection), [`CharacterPolicy`](crate::CharacterPolicy) and others are inputs, which the
+/// simulation reads at every tick.
+#[derive(Clone, Debug)]
+pub struct RagdollSnapshot {
+    kind: Arc<KindIdentity>,
+    slot: Slot,
+    state: LaneState,
+}
+
+/// All ragdolls and the clocks of the simulation. From [`Marathon::save_all`].
+#[derive(Clone, Debug)]
+pub struct MarathonSnapshot {
+    now: Duration,
+    decisions: u64,
+    /// Time of the newest states of each kind.
+    clocks: Vec<Duration>,
+    ragdolls: Vec<(RagdollState, RagdollSnapshot)>,
+}
+
+/// Why a snapshot cannot be restored or read. Nothing has changed then.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SnapshotError {
+    /// The ragdoll was despawned.
+    #[error("the ragdoll has left the simulation")]
+    Gone,
+    /// The snapshot is of another agent or prefab.
+    #[error("the snapshot is of '{found}', expected '{expected}'")]
+    Character {
+        /// Task or model of the snapshot.
+        found: String,
+        /// Task or model of the ragdoll.
+        expected: String,
+    },
+    /// The task has the same name and other options, another clip or another ground.
+    #[error("the snapshot is of '{character}' with other task options, another clip or another ground")]
+    Task {
+        /// Task of both.
+        character: String,
+    },
+    /// The model has changed since.
+    #[error("the snapshot is of '{character}' with another model, expected one of the present model")]
+    Model {
+        /// Task or model of both.
+        character: String,
+    },
+    /// The bytes have the format of another version.
+    #[error("the format of the snapshot is '{found}', expected '{}': it was saved by another version of Marathon", MARK.escape_ascii())]
+    Format {
+        /// Mark at their start.
+        found: String,
+    },
+    /// The bytes are something else.
+    #[error("{bytes} bytes that do not begin with the mark '{}' of a ragdoll's snapshot", MARK.escape_ascii())]
+    Mark {
+        /// Number of bytes.
+        bytes: usize,
+    },
+    /// A byte has changed, or some are missing.
+    #[error("the snapshot is damaged or cut short: its checksum is {found:08x}, expected {expected:08x}")]
+    Checksum {
+        /// Checksum of the bytes.
+        found: u32,
+        /// Checksum that they note.
+        expected: u32,
+    },
+    /// Its content is inconsistent.
+    #[error("the snapshot cannot be used: {0}")]
+    Damaged(&'static str),
+    /// Its content cannot be decoded.
+    #[error("the snapshot cannot be decoded: {0}")]
+    Decode(#[from] postcard::Error),
+    /// The task refuses its state.
+    #[error(transparent)]
+    Env(#[from] EnvError),
+}
+
+impl RagdollSnapshot {
+    /// Checksum of the state that the future depends on. Peers that compare it find out when their simulations differ.
+    pub fn checksum(&self) -> u32 {
+        self.state.checksum()
+    }
+
+    /// The snapshot as bytes, for a file or a peer. Computers of any instruction set read the same bits from it.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        // serialization into memory has no error for lists, numbers and text
+        let body = postcard::to_stdvec(&(&*self.kind, &self.slot, &self.state)).unwrap_or_default();
+        [&MARK[..], &crc32fast::hash(&body).to_le_bytes(), &body].concat()
+    }
+
+    /// Reads a snapshot from bytes of [`RagdollSnapshot::to_bytes`].
+    ///
+    /// # Errors
+    /// If the bytes are damaged, have the format of another version, or are something else.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, SnapshotError> {
+        let something_else = || SnapshotError::Mark { bytes: bytes.len() };
+        let (mark, rest) = bytes.split_first_chunk::<8>().ok_or_else(something_else)?;
+        if mark[..6] != MARK[..6] {
+            return Err(something_else());
+        }
+        if mark != MARK {
+            return Err(SnapshotError::Format { found: mark.escape_ascii().to_string() });
+        }
+        let (sum, body) = rest.split_first_chunk().ok_or_else(something_else)?;
+        let (found, expected) = (crc32fast::hash(body), u32::from_le_bytes(*sum));
+        if found != expected {
+            return Err(SnapshotError::Checksum { found, expected });
+        }
+        let (kind, slot, state) = postcard::from_bytes::<(KindIdentity, Slot, LaneState)>(body)?;
+        Ok(RagdollSnapshot { kind: Arc::new(kind), slot, state })
+    }
+
+    /// Refuses to be restored into another kind of ragdoll.
+    fn check(&self, kind: &KindIdentity) -> Result<(), SnapshotError> {
+        let character = || self.kind.character.clone();
+        match &*self.kind {
+            own if own.character != kind.character => {
+                Err(SnapshotError::Character { found: character(), expected: kind.character.clone() })
+            }
+            own if own.task != kind.task => Err(SnapshotError::Task { character: character() }),
+            own if own.model != kind.model => Err(SnapshotError::Model { character: character() }),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl MarathonSnapshot {
+    /// Checksum of the states of all ragdolls, as [`RagdollSnapshot::checksum`].
+    pub fn checksum(&self) -> u32 {
+        let mut sum = crc32fast::Hasher::new();
+        self.ragdolls.iter().for_each(|(_, ragdoll)| sum.update(&ragdoll.checksum().to_le_bytes()));
+        sum.finalize()
+    }
+
+    /// Number of ragdolls.
+    pub fn len(&self) -> usize {
+        self.ragdolls.len()
+    }
+
+    /// Whether it has no ragdolls.
+    pub fn is_empty(&self) -> bool {
+        self.ragdolls.is_empty()
+    }
+}
+
+impl Marathon {
+    /// Copies a whole ragdoll. `None` if it has left the simulation. Save between ticks, or in systems after
+    /// [`MarathonSystems::Report`](crate::MarathonSystems::Report): messages that are not reported yet are part of the snapshot.
+    pub fn save(&mut self, ragdoll: &RagdollState) -> Option<RagdollSnapshot> {
+        let RagdollState { kind, batch, lane } = *ragdoll;
+        let kind = self.kinds.get_mut(kind)?;
+        let identity = kind.identity().clone();
+        let (slot, state) = kind.batches.get_mut(batch)?.save(lane)?;
+        Some(RagdollSnapshot { kind: identity, slot, state })
+    }
+
+    /// Puts a ragdoll back into a state that it, or another ragdoll of the same character and task, was in. What follows has
+    /// the same bits as what followed the snapshot, if the inputs are the same. Other ragdolls do not change a bit.
+    ///
+    /// The clock of the simulation goes on: the restored state is the newest one, whatever the time of the snapshot. A ragdoll
+    /// at [`Lod::HalfRate`](crate::Lod::HalfRate) or with a [`MoveDirection`](crate::MoveDirection) also depends on that
+    /// clock; use [`Marathon::restore_all`] for it.
+    ///
+    /// # Errors
+    /// If the ragdoll has left the simulation, or the snapshot belongs to another character, task, ground or model.
+    pub fn restore(&mut self, ragdoll: &RagdollState, snapshot: &RagdollSnapshot) -> Result<(), SnapshotError> {
+        let kind = self.kinds.get_mut(ragdoll.kind).ok_or(SnapshotError::Gone)?;
+        snapshot.check(kind.identity())?;
+        kind.load((ragdoll.batch, ragdoll.lane), &snapshot.slot, &snapshot.state)
+    }
+
+    /// Copies all ragdolls and the clocks of the simulation, as [`Marathon::save`].
+    pub fn save_all(&mut self) -> MarathonSnapshot {
+        let keys: Vec<RagdollState> = self.keys().collect();
+        MarathonSnapshot {
+            now: self.now,
+            decisions: self.decisions,
+            clocks: self.kinds.iter().map(|kind| kind.time).collect(),
+            ragdolls: keys.into_iter().filter_map(|key| Some((key, self.save(&key)?))).collect(),
+        }
+    }
+
+    /// Puts all ragdolls and the clocks of the simulation back, in the app that the snapshot is from. Returns how many ragdolls
+    /// were restored: those that have left since are skipped, and those that have entered since stay as they are.
+    ///
+    /// Put [`Time<Fixed>`](bevy::time::Fixed) back to the same tick, then run
+    /// [`FixedUpdate`](bevy::app::FixedUpdate) once for each tick to replay. The example `rollback` does so.
+    ///
+    /// # Errors
+    /// If the snapshot is from another app with other kinds of ragdolls. Then nothing has changed.
+    pub fn restore_all(&mut self, snapshot: &MarathonSnapshot) -> Result<usize, SnapshotError> {
+        for (key, ragdoll) in &snapshot.ragdolls {
+            ragdoll.check(self.kinds.get(key.kind).ok_or(SnapshotError::Gone)?.identity())?;
+        }
+        (self.now, self.decisions) = (snapshot.now, snapshot.decisions);
+        for (kind, time) in self.kinds.iter_mut().zip(&snapshot.clocks) {
+            kind.time = *time;
+        }
+        // a ragdoll may have moved to another lane, and its lane may have another ragdoll
+        let keys = self.keys().filter_map(|key| Some(((key.kind, self.slot(key)?.entered), key)));
+        let keys: BTreeMap<(usize, u64), RagdollState> = keys.collect();
+        let mut restored = 0;
+        for (key, ragdoll) in &snapshot.ragdolls {
+            if let Some(key) = keys.get(&(key.kind, ragdoll.slot.entered)) {
+                self.restore(key, ragdoll)?;
+                restored += 1;
+            }
+        }
+        Ok(restored)
+    }
+
+    /// The keys of all ragdolls in the simulation.
+    fn keys(&self) -> impl Iterator<Item = RagdollState> {
+        self.kinds.iter().enumerate().flat_map(|(kind, of_kind)| {
+            of_kind.batches.iter().enumerate().flat_map(move |(batch, lanes)| {
+                let taken = lanes.lanes.iter().enumerate().filter(|(_, slot)| slot.is_some());
+                taken.map(move |(lane, _)| RagdollState { kind, batch, lane })
+            })
+        })
+    }
+}
