@@ -3,7 +3,8 @@
 use crate::asset::{MjcfLoader, PolicyAsset, PolicyLoader, RagdollPrefab};
 use crate::command::AgentCommand;
 use crate::direction::{self, MoveDirection};
-use crate::lod::{self, Lod, LodByDistance};
+use crate::levels;
+use crate::lod::{Lod, LodByDistance};
 use crate::marathon::Marathon;
 use crate::ragdoll::{
     CharacterPolicy, Controls, Episode, EpisodeBegan, EpisodeEnded, FootContact, Held, LaidGround, Opponent, OwnGround,
@@ -55,7 +56,14 @@ impl Plugin for MarathonPlugin {
             .add_systems(
                 FixedUpdate,
                 (
-                    (simulate::admit, direction::follow, lod::by_distance, simulate::take_in, simulate::push, lod::pack)
+                    (
+                        simulate::admit,
+                        direction::follow,
+                        levels::by_distance,
+                        simulate::take_in,
+                        simulate::push,
+                        levels::pack,
+                    )
                         .chain()
                         .in_set(MarathonSystems::Admit),
                     simulate::simulate.in_set(MarathonSystems::Simulate),

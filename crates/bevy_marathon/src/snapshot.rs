@@ -1,15 +1,14 @@
 //! Snapshots of ragdolls: for rollback, saved games, and peers that join later.
 
 use crate::characters::{KindIdentity, LaneState, Slot};
+use crate::error::SnapshotError;
 use crate::marathon::{Marathon, RagdollState};
-use marathon_envs::EnvError;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
-use thiserror::Error;
 
 /// Mark of the bytes of a snapshot. The last two digits are the version.
-const MARK: &[u8; 8] = b"MRTHNr01";
+const MARK: &str = "MRTHNr01";
 
 /// A whole ragdoll at a decision: its physics with the warm start of the solver, the phase and the memory of its task, its
 /// command and the schedule of commands, its random streams, its episode, pushes that still act, whether it
@@ -35,64 +34,6 @@ pub struct MarathonSnapshot {
     ragdolls: Vec<(RagdollState, RagdollSnapshot)>,
 }
 
-/// Why a snapshot cannot be restored or read. Nothing has changed then.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum SnapshotError {
-    /// The ragdoll was despawned.
-    #[error("the ragdoll has left the simulation")]
-    Gone,
-    /// The snapshot is of another agent or prefab.
-    #[error("the snapshot is of '{found}', expected '{expected}'")]
-    Character {
-        /// Task or model of the snapshot.
-        found: String,
-        /// Task or model of the ragdoll.
-        expected: String,
-    },
-    /// The task has the same name and other options, another clip or another ground.
-    #[error("the snapshot is of '{character}' with other task options, another clip or another ground")]
-    Task {
-        /// Task of both.
-        character: String,
-    },
-    /// The model has changed since.
-    #[error("the snapshot is of '{character}' with another model, expected one of the present model")]
-    Model {
-        /// Task or model of both.
-        character: String,
-    },
-    /// The bytes have the format of another version.
-    #[error("the format of the snapshot is '{found}', expected '{}': it was saved by another version of Marathon", MARK.escape_ascii())]
-    Format {
-        /// Mark at their start.
-        found: String,
-    },
-    /// The bytes are something else.
-    #[error("{bytes} bytes that do not begin with the mark '{}' of a ragdoll's snapshot", MARK.escape_ascii())]
-    Mark {
-        /// Number of bytes.
-        bytes: usize,
-    },
-    /// A byte has changed, or some are missing.
-    #[error("the snapshot is damaged or cut short: its checksum is {found:08x}, expected {expected:08x}")]
-    Checksum {
-        /// Checksum of the bytes.
-        found: u32,
-        /// Checksum that they note.
-        expected: u32,
-    },
-    /// Its content is inconsistent.
-    #[error("the snapshot cannot be used: {0}")]
-    Damaged(&'static str),
-    /// Its content cannot be decoded.
-    #[error("the snapshot cannot be decoded: {0}")]
-    Decode(#[from] postcard::Error),
-    /// The task refuses its state.
-    #[error(transparent)]
-    Env(#[from] EnvError),
-}
-
 impl RagdollSnapshot {
     /// Checksum of the state that the future depends on. Peers that compare it find out when their simulations differ.
     pub fn checksum(&self) -> u32 {
@@ -103,7 +44,7 @@ impl RagdollSnapshot {
     pub fn to_bytes(&self) -> Vec<u8> {
         // serialization into memory has no error for lists, numbers and text
         let body = postcard::to_stdvec(&(&*self.kind, &self.slot, &self.state)).unwrap_or_default();
-        [&MARK[..], &crc32fast::hash(&body).to_le_bytes(), &body].concat()
+        [MARK.as_bytes(), &crc32fast::hash(&body).to_le_bytes(), &body].concat()
     }
 
     /// Reads a snapshot from bytes of [`RagdollSnapshot::to_bytes`].
@@ -111,13 +52,13 @@ impl RagdollSnapshot {
     /// # Errors
     /// If the bytes are damaged, have the format of another version, or are something else.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, SnapshotError> {
-        let something_else = || SnapshotError::Mark { bytes: bytes.len() };
+        let something_else = || SnapshotError::Mark { bytes: bytes.len(), expected: MARK };
         let (mark, rest) = bytes.split_first_chunk::<8>().ok_or_else(something_else)?;
-        if mark[..6] != MARK[..6] {
+        if mark[..6] != MARK.as_bytes()[..6] {
             return Err(something_else());
         }
-        if mark != MARK {
-            return Err(SnapshotError::Format { found: mark.escape_ascii().to_string() });
+        if mark != MARK.as_bytes() {
+            return Err(SnapshotError::Format { found: mark.escape_ascii().to_string(), expected: MARK });
         }
         let (sum, body) = rest.split_first_chunk().ok_or_else(something_else)?;
         let (found, expected) = (crc32fast::hash(body), u32::from_le_bytes(*sum));

@@ -2,7 +2,7 @@
 
 use super::batch::Engine;
 use super::{CharacterBatch, CharacterKind, Slot};
-use crate::snapshot::SnapshotError;
+use crate::error::SnapshotError;
 use bevy::prelude::*;
 use marathon_envs::BLOCK;
 use marathon_physics::AgentState;
@@ -151,7 +151,9 @@ impl CharacterBatch {
     pub(super) fn grounds(&mut self, lane: usize) -> Vec<Vec<f32>> {
         match self.engine.get() {
             // lanes and fields exist
-            Engine::Env(env) => (0..self.model.hfields.len()).filter_map(|field| env.ground(lane, field).ok()).collect(),
+            Engine::Env(env) => {
+                (0..self.model.hfields.len()).filter_map(|field| env.ground(lane, field).ok()).collect()
+            }
             Engine::Free(..) => Vec::new(),
         }
     }

@@ -58,9 +58,9 @@ impl Deciders {
     /// The turns of an agent of a block: a byte for each role, with bits for deciding and for the two ways of leaving.
     pub fn save(&self, block: usize, lane: usize) -> impl Iterator<Item = u8> {
         let bit = move |mask: u16, at: u8| ((mask >> lane & 1) as u8) << at;
-        self.turns[block * self.roles..][..self.roles]
-            .iter()
-            .map(move |Turn { decides, leaves: [failed, finished] }| bit(*decides, 0) | bit(*failed, 1) | bit(*finished, 2))
+        self.turns[block * self.roles..][..self.roles].iter().map(
+            move |Turn { decides, leaves: [failed, finished] }| bit(*decides, 0) | bit(*failed, 1) | bit(*finished, 2),
+        )
     }
 
     /// Restores the turns of an agent. `turns` has a byte for each role.
