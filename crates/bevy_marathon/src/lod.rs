@@ -16,7 +16,8 @@ pub enum Lod {
     /// messages are as before. Policies are trained at the full rate: how well one moves at half of it depends on the policy.
     HalfRate,
     /// It is not simulated: its body stands in the air if need be, its episode does not go on, and a [`Push`](crate::Push) has
-    /// no effect. When it wakes up, it continues with the bits that it would have had.
+    /// no effect. When it wakes up, it continues with the bits that it would have had. Only a
+    /// [`MoveDirection`](crate::MoveDirection) notices the pause, because it goes by the clock.
     Asleep,
 }
 

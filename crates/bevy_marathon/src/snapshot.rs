@@ -116,9 +116,8 @@ impl Marathon {
     /// Puts a ragdoll back into a state that it, or another ragdoll of the same character and task, was in. What follows has
     /// the same bits as what followed the snapshot, if the inputs are the same. Other ragdolls do not change a bit.
     ///
-    /// The clock of the simulation goes on: the restored state is the newest one, whatever the time of the snapshot. A ragdoll
-    /// at [`Lod::HalfRate`](crate::Lod::HalfRate) or with a [`MoveDirection`](crate::MoveDirection) also depends on that
-    /// clock; use [`Marathon::restore_all`] for it.
+    /// The clock of the simulation goes on: the restored state is the newest one, whatever the time of the snapshot. A
+    /// [`MoveDirection`](crate::MoveDirection) also reads that clock; use [`Marathon::restore_all`] with it.
     ///
     /// # Errors
     /// If the ragdoll has left the simulation, or the snapshot belongs to another character, task, ground or model.

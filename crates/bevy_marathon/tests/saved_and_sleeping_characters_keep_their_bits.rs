@@ -61,7 +61,7 @@ fn play(app: &mut App, number: usize, ragdoll: Entity, tick: usize) {
     if let Some(mut command) = app.world_mut().get_mut::<AgentCommand>(ragdoll)
         && phase.is_multiple_of(20)
     {
-        let flips = phase / 20 % 3 == 0;
+        let flips = (phase / 20).is_multiple_of(3);
         for (name, value) in [("speed", if flips { 0.0 } else { 2.0 }), ("turn", 0.5), ("jump", 0.0), ("backflip", 0.0)]
         {
             command.set(name, value).expect("it takes this command");
@@ -73,7 +73,7 @@ fn play(app: &mut App, number: usize, ragdoll: Entity, tick: usize) {
         }
     }
     if phase % 31 == 5 {
-        let force = Vec3::new(40.0, 0.0, if number % 2 == 0 { 60.0 } else { -60.0 });
+        let force = Vec3::new(40.0, 0.0, if number.is_multiple_of(2) { 60.0 } else { -60.0 });
         app.world_mut().write_message(Push { ragdoll, body: 1, force, at: None, seconds: 0.3 });
     }
 }
@@ -261,7 +261,7 @@ fn sleepers_continue_and_the_others_do_not_notice() {
     let (mut plain, all) = crowd("ant", 32);
     let (mut napping, same) = crowd("ant", 32);
     assert_eq!(all, same);
-    let sleeps = |i: usize| i % 2 == 0 || i > 27;
+    let sleeps = |i: usize| i.is_multiple_of(2) || i > 27;
     let mut expected = vec![Vec::new(); 32];
     for now in 0..250 {
         for (_, ragdoll) in same.iter().enumerate().filter(|(i, _)| sleeps(*i)) {
@@ -310,7 +310,7 @@ fn at_half_rate_actions_are_held_and_the_others_do_not_notice() {
         let episode = half.world().get::<Episode>(all[1]).expect("it has an episode");
         actions.push((episode.number, episode.decisions, episode.action.clone()));
     }
-    let held = |pair: &&[(u64, u64, Vec<f32>)]| pair[0].0 == pair[1].0 && pair[1].1 % 2 == 0;
+    let held = |pair: &&[(u64, u64, Vec<f32>)]| pair[0].0 == pair[1].0 && pair[1].1.is_multiple_of(2);
     let pairs: Vec<_> = actions.windows(2).filter(held).collect();
     assert!(pairs.len() > 40 && pairs.iter().all(|pair| pair[0].2 == pair[1].2), "each action is held once");
     let changed = actions.windows(2).filter(|pair| pair[1].1 % 2 == 1 && pair[0].2 != pair[1].2).count();

@@ -155,9 +155,12 @@ impl CharacterBatch {
             }
             Engine::Free(batch, _) => batch.reset(lane, qpos, qvel),
         }
+        let sleeps = self.lanes[lane].as_ref().is_some_and(|slot| slot.asleep.is_some());
+        let asleep = sleeps.then(|| self.lane_state(lane));
         // what was before it is not on the way there
         if let Some(slot) = &mut self.lanes[lane] {
             slot.history.clear();
+            slot.asleep = asleep;
         }
         self.record(lane, time, true);
     }
