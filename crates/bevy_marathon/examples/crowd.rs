@@ -1,7 +1,7 @@
 //! A crowd: 64 characters, each on its own way. `cargo run --release -p bevy_marathon --features window --example crowd`
 //!
-//! Those that are far from the camera decide at half the rate, and those farther away sleep. Hold the space key to send all
-//! of them to the middle.
+//! Policies far from the camera decide at half the rate, and characters farther away sleep. Hold the space key to send all of
+//! them to the middle.
 
 use bevy::prelude::*;
 use bevy_marathon::prelude::*;

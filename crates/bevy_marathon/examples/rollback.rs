@@ -23,7 +23,7 @@ struct Input {
 }
 
 impl Input {
-    /// What a player presses: something else about three times a second.
+    /// The buttons of a player, who presses others about three times a second.
     fn pressed(player: u64, tick: u64) -> Self {
         let choice = (tick / 20).wrapping_mul(0x9e37_79b9).wrapping_add(player * 77) >> 3;
         Input {
@@ -105,7 +105,7 @@ impl Peer {
     }
 }
 
-/// What happened.
+/// Result of a game.
 #[derive(Debug)]
 pub struct Outcome {
     /// Ticks whose prediction was wrong.
@@ -126,7 +126,7 @@ pub fn play(ticks: u64) -> Result<Outcome, Box<dyn std::error::Error>> {
     let mut known = Input::default();
     let (mut rollbacks, mut replayed) = (0, 0);
     for tick in 0..ticks + DELAY {
-        // the last inputs arrive while nobody plays on
+        // the last inputs arrive after the last tick
         let playing = tick < ticks;
         if playing {
             referee.tick([0, 1].map(|player| Input::pressed(player, tick)))?;

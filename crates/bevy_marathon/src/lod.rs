@@ -24,7 +24,7 @@ pub enum Lod {
 /// Sets the [`Lod`] of all ragdolls by their distance to this entity, such as a camera. With several of them, the nearest
 /// counts. Without any, every `Lod` is yours.
 ///
-/// What a camera is near to depends on the player and on the frame rate. Games that play the same bits on several computers set
+/// The place of a camera depends on the player and on the frame rate. Games that play the same bits on several computers set
 /// [`Lod`] themselves, from positions in the simulation.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Default, Clone, Debug, PartialEq)]

@@ -10,11 +10,13 @@ use std::time::Duration;
 /// Mark of the bytes of a snapshot. The last two digits are the version.
 const MARK: &str = "MRTHNr01";
 
-/// A whole ragdoll at a decision: its physics with the warm start of the solver, the phase and the memory of its task, its
-/// command and the schedule of commands, its random streams, its episode, pushes that still act, whether it
-/// [sleeps](crate::Lod::Asleep), and the poses that frames are drawn between. From [`Marathon::save`].
+/// A whole ragdoll at a decision, from [`Marathon::save`].
 ///
-/// What the components of the ragdoll say is not part of it: [`Controls`](crate::Controls), [`AgentCommand`](crate::AgentCommand),
+/// It holds the physics with the warm start of the solver, and the phase and the memory of the task. It holds command, schedule
+/// of commands, random streams, episode, and pushes that still act. It holds the poses that frames are drawn between, and
+/// whether the ragdoll [sleeps](crate::Lod::Asleep).
+///
+/// The components of the ragdoll are not part of it. [`Controls`](crate::Controls), [`AgentCommand`](crate::AgentCommand),
 /// [`MoveDirection`](crate::MoveDirection), [`CharacterPolicy`](crate::CharacterPolicy) and others are inputs, which the
 /// simulation reads at every tick.
 #[derive(Clone, Debug)]
@@ -113,8 +115,8 @@ impl Marathon {
         Some(RagdollSnapshot { kind: identity, slot, state })
     }
 
-    /// Puts a ragdoll back into a state that it, or another ragdoll of the same character and task, was in. What follows has
-    /// the same bits as what followed the snapshot, if the inputs are the same. Other ragdolls do not change a bit.
+    /// Puts a ragdoll back into a state that it, or another ragdoll of the same character and task, was in. It continues with
+    /// the same bits as after the snapshot, if the inputs are the same. Other ragdolls do not change a bit.
     ///
     /// The clock of the simulation goes on: the restored state is the newest one, whatever the time of the snapshot. A
     /// [`MoveDirection`](crate::MoveDirection) also reads that clock; use [`Marathon::restore_all`] with it.

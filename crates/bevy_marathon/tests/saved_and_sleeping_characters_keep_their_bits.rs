@@ -1,5 +1,5 @@
-//! A character that is saved and restored, or that sleeps and wakes up, continues with the bits that it would have had, and no
-//! other character changes a bit.
+//! A character that is saved and restored, or that sleeps and wakes up, continues with the bits that it would have had. No other
+//! character changes a bit.
 
 mod common;
 
@@ -78,8 +78,8 @@ fn play(app: &mut App, number: usize, ragdoll: Entity, tick: usize) {
     }
 }
 
-/// Saves random characters, plays on, and restores them, so often. Each tick of each life must have the bits of a run that
-/// nobody disturbed. Returns how many times one was seen upside down.
+/// Saves random characters, plays on, and restores them, so often. Each tick of each life must have the bits of an
+/// undisturbed run. Returns how many times one was seen upside down.
 fn restores_keep_bits(agent: &str, restores: usize) -> usize {
     const TICKS: usize = 260;
     let all_bits = |app: &App, all: &[Entity]| all.iter().map(|ragdoll| bits(app, *ragdoll)).collect::<Vec<_>>();

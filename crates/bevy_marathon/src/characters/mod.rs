@@ -56,7 +56,7 @@ pub(crate) struct CharacterKind {
     pub unpacked: bool,
     /// Ragdolls that have entered so far.
     entered: u64,
-    /// What its snapshots belong to, once there is one.
+    /// Mark of its snapshots, once there is one.
     identity: OnceLock<Arc<KindIdentity>>,
 }
 

@@ -11,7 +11,7 @@ use std::io::Write;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What a snapshot belongs to.
+/// Kind of ragdoll that a snapshot is of.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct KindIdentity {
     /// The task, or the name of a prefab's model.
@@ -22,12 +22,12 @@ pub(crate) struct KindIdentity {
     pub model: u32,
 }
 
-/// What the simulation has of a lane, besides its [`Slot`].
+/// State of a lane in the simulation, without its [`Slot`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LaneState {
     /// Physics, memory and command of the task, and position in the random streams.
     engine: Vec<u8>,
-    /// What its policy acts on next.
+    /// Observations for its next action.
     obs: Vec<f32>,
     /// Its last action, which roles keep that do not decide.
     action: Vec<f32>,
@@ -67,7 +67,7 @@ fn checksum(value: &impl Serialize) -> u32 {
 }
 
 impl CharacterKind {
-    /// What its snapshots belong to.
+    /// The mark of its snapshots.
     pub fn identity(&self) -> &Arc<KindIdentity> {
         self.identity.get_or_init(|| {
             Arc::new(KindIdentity {
@@ -95,7 +95,7 @@ impl CharacterBatch {
         Some((slot, state))
     }
 
-    /// What the simulation has of a lane.
+    /// The state of a lane in the simulation.
     pub(super) fn lane_state(&mut self, lane: usize) -> LaneState {
         let engine = match self.engine.get() {
             // the lane exists, and so does its agent
@@ -128,7 +128,7 @@ impl CharacterBatch {
         Ok(())
     }
 
-    /// Restores what the simulation has of a lane.
+    /// Restores the state of a lane in the simulation.
     pub(super) fn load_lane(&mut self, lane: usize, state: &LaneState) -> Result<(), SnapshotError> {
         let LaneState { engine, obs, action } = state;
         if (obs.len() * BLOCK, action.len() * BLOCK) != (self.obs.len(), self.action.len()) {
