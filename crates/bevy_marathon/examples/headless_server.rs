@@ -1,6 +1,6 @@
 //! A server: thirty-two hoppers that are not drawn. No window, no graphics card, no renderer in the build:
 //!
-//! `cargo run --release -p bevy_marathon --no-default-features --example headless_server`
+//! `cargo run --release -p bevy_marathon --example headless_server`
 //!
 //! A server reads messages and states. Its frames can have any length.
 

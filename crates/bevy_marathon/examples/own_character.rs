@@ -1,5 +1,5 @@
 //! A character of your own: a body in MJCF, a task in Rust, and a policy for it, learned and played in one program without a
-//! window: `cargo run --release -p bevy_marathon --no-default-features --example own_character`
+//! window: `cargo run --release -p bevy_marathon --example own_character`
 //!
 //! The task is registered under a name; from then on it is an agent like any other: `marathon_learn` trains it,
 //! [`Ragdoll::agent`] spawns it.

@@ -1,4 +1,4 @@
-//! A trained humanoid in a Bevy app: `cargo run --release -p bevy_marathon --example ragdoll`
+//! A trained humanoid in a Bevy app: `cargo run --release -p bevy_marathon --features window --example ragdoll`
 //!
 //! Every plugin after [`MarathonPlugin`] is optional: your game has its own ground, light and camera.
 

@@ -1,5 +1,5 @@
 //! A rover that you drive: the left stick of a gamepad, or the arrow keys, set its velocity. Released, it stops. G, or the
-//! button South, gives it back to its own schedule: `cargo run --release -p bevy_marathon --example steer`
+//! button South, gives it back to its own schedule: `cargo run --release -p bevy_marathon --features window --example steer`
 //!
 //! Its agent, `examples/rover.rs`, takes a command. It learns for some seconds to follow its own schedule; then
 //! [`AgentCommand`] sets the velocity.

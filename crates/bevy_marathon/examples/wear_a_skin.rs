@@ -1,5 +1,5 @@
 //! A character that wears a skin: a figure with a skeleton, modeled anywhere, in place of the shapes that the physics knows:
-//! `cargo run --release -p bevy_marathon --example wear_a_skin -- hero.glb`
+//! `cargo run --release -p bevy_marathon --features window --example wear_a_skin -- hero.glb`
 //!
 //! Without a file it is the figure that comes with Marathon. Each bone follows a body by its name. The names of Mixamo, Unreal, Unity,
 //! Blender and others are known.

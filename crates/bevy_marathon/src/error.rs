@@ -1,4 +1,4 @@
-//! Errors of ragdolls and their commands.
+//! Errors of ragdolls, their commands and their snapshots.
 
 use marathon_envs::{CommandRange, EnvError};
 use marathon_physics::{SimError, hint};
@@ -70,4 +70,68 @@ pub enum CommandError {
         /// The value that was given.
         value: f64,
     },
+}
+
+/// Why a snapshot cannot be restored or read. Nothing has changed then.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SnapshotError {
+    /// The ragdoll was despawned.
+    #[error("the ragdoll has left the simulation")]
+    Gone,
+    /// The snapshot is of another agent or prefab.
+    #[error("the snapshot is of '{found}', expected '{expected}'")]
+    Character {
+        /// Task or model of the snapshot.
+        found: String,
+        /// Task or model of the ragdoll.
+        expected: String,
+    },
+    /// The task has the same name and other options, another clip or another ground.
+    #[error("the snapshot is of '{character}' with other task options, another clip or another ground")]
+    Task {
+        /// Task of both.
+        character: String,
+    },
+    /// The model has changed since.
+    #[error("the snapshot is of '{character}' with another model, expected one of the present model")]
+    Model {
+        /// Task or model of both.
+        character: String,
+    },
+    /// The bytes have the format of another version.
+    #[error(
+        "the format of the snapshot is '{found}', expected '{expected}': it was saved by another version of Marathon"
+    )]
+    Format {
+        /// Mark at their start.
+        found: String,
+        /// Mark of this version.
+        expected: &'static str,
+    },
+    /// The bytes are something else.
+    #[error("{bytes} bytes that do not begin with the mark '{expected}' of a ragdoll's snapshot")]
+    Mark {
+        /// Number of bytes.
+        bytes: usize,
+        /// Mark of a snapshot.
+        expected: &'static str,
+    },
+    /// A byte has changed, or some are missing.
+    #[error("the snapshot is damaged or cut short: its checksum is {found:08x}, expected {expected:08x}")]
+    Checksum {
+        /// Checksum of the bytes.
+        found: u32,
+        /// Checksum that they note.
+        expected: u32,
+    },
+    /// Its content is inconsistent.
+    #[error("the snapshot cannot be used: {0}")]
+    Damaged(&'static str),
+    /// Its content cannot be decoded.
+    #[error("the snapshot cannot be decoded: {0}")]
+    Decode(#[from] postcard::Error),
+    /// The task refuses its state.
+    #[error(transparent)]
+    Env(#[from] EnvError),
 }

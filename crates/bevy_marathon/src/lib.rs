@@ -40,13 +40,13 @@
 //!
 //! # Features
 //!
-//! | feature | default | adds |
-//! |---|---|---|
-//! | `render` | yes | the module `look`: plugins that draw ragdolls |
-//! | `window` | yes | Bevy's window, input devices and glTF reader |
-//! | `baseline` | no | kernels for x86-64 processors without fused multiply-add |
+//! | feature | adds |
+//! |---|---|
+//! | `render` | the module `look`: plugins that draw ragdolls |
+//! | `window` | `render`, and Bevy's window, input devices and glTF reader |
+//! | `baseline` | kernels for x86-64 processors without fused multiply-add |
 //!
-//! Without features nothing draws and no renderer is compiled, as a server needs it.
+//! None is a default: then nothing draws and no renderer is compiled, as a server needs it.
 
 pub mod asset;
 pub mod axes;
@@ -55,6 +55,8 @@ mod command;
 mod direction;
 mod error;
 mod ground;
+mod levels;
+mod lod;
 #[cfg(feature = "render")]
 pub mod look;
 mod marathon;
@@ -62,16 +64,19 @@ mod plugin;
 pub mod pose;
 mod ragdoll;
 mod simulate;
+mod snapshot;
 
 pub use asset::{PolicyAsset, RagdollPrefab};
 pub use characters::{PoseSample, spec_of_role};
 pub use command::AgentCommand;
 pub use direction::MoveDirection;
-pub use error::{CommandError, RagdollError};
+pub use error::{CommandError, RagdollError, SnapshotError};
 pub use ground::{Ground, TRACK_HALF_WIDTH};
+pub use lod::{Lod, LodByDistance};
 pub use marathon::{Marathon, RagdollState};
 pub use plugin::{MarathonPlugin, MarathonSystems};
 pub use ragdoll::*;
+pub use snapshot::{MarathonSnapshot, RagdollSnapshot};
 
 /// The names that most apps need.
 pub mod prelude {
@@ -83,8 +88,8 @@ pub mod prelude {
     pub use crate::plugin::{MarathonPlugin, MarathonSystems};
     pub use crate::ragdoll::*;
     pub use crate::{
-        AgentCommand, CommandError, Ground, Marathon, MoveDirection, PolicyAsset, RagdollError, RagdollPrefab,
-        RagdollState,
+        AgentCommand, CommandError, Ground, Lod, LodByDistance, Marathon, MarathonSnapshot, MoveDirection, PolicyAsset,
+        RagdollError, RagdollPrefab, RagdollSnapshot, RagdollState, SnapshotError,
     };
     pub use marathon_physics::Variation;
     pub use marathon_runs::TaskConfig;

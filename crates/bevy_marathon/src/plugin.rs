@@ -3,6 +3,8 @@
 use crate::asset::{MjcfLoader, PolicyAsset, PolicyLoader, RagdollPrefab};
 use crate::command::AgentCommand;
 use crate::direction::{self, MoveDirection};
+use crate::levels;
+use crate::lod::{Lod, LodByDistance};
 use crate::marathon::Marathon;
 use crate::ragdoll::{
     CharacterPolicy, Controls, Episode, EpisodeBegan, EpisodeEnded, FootContact, Held, LaidGround, Opponent, OwnGround,
@@ -54,7 +56,14 @@ impl Plugin for MarathonPlugin {
             .add_systems(
                 FixedUpdate,
                 (
-                    (simulate::admit, direction::follow, simulate::take_in, simulate::push)
+                    (
+                        simulate::admit,
+                        direction::follow,
+                        levels::by_distance,
+                        simulate::take_in,
+                        simulate::push,
+                        levels::pack,
+                    )
                         .chain()
                         .in_set(MarathonSystems::Admit),
                     simulate::simulate.in_set(MarathonSystems::Simulate),
@@ -76,6 +85,8 @@ fn register_types(app: &mut App) {
         .register_type::<AgentCommand>()
         .register_type::<MoveDirection>()
         .register_type::<LaidGround>()
+        .register_type::<Lod>()
+        .register_type::<LodByDistance>()
         .register_type::<Target>()
         .register_type::<Physique>()
         .register_type::<Restart>()

@@ -3,11 +3,13 @@
 use crate::asset::{PolicyAsset, RagdollPrefab};
 use crate::error::RagdollError;
 use crate::ground::Ground;
+use crate::lod::Lod;
 use bevy::prelude::*;
 use bevy::reflect::reflect_remote;
 use marathon_envs::Spec;
 use marathon_physics::{Model, Variation};
 use marathon_runs::TaskConfig;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// A physical character. Its [`Transform`] is where its track begins and which way it runs (along its own +x); the
@@ -17,7 +19,7 @@ use std::sync::Arc;
 /// ragdolls of the world.
 #[derive(Component, Clone, Debug, Reflect)]
 #[reflect(Component, Clone, Debug)]
-#[require(Transform, Episode, Restart, OwnGround)]
+#[require(Transform, Episode, Restart, OwnGround, Lod)]
 pub struct Ragdoll {
     /// Kind of the ragdoll.
     pub character: Character,
@@ -157,7 +159,7 @@ impl Default for Restart {
 pub struct OwnGround(#[reflect(ignore)] pub Arc<Vec<Vec<f32>>>);
 
 /// The present episode of a [`Ragdoll`]. Written by the plugin after every decision.
-#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect, Serialize, Deserialize)]
 #[reflect(Component, Default, Clone, Debug, PartialEq)]
 pub struct Episode {
     /// Number of the episode, the first being 1; 0 before it has begun.
@@ -267,7 +269,7 @@ pub struct FootContact {
 }
 
 /// Why an episode ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum End {
     /// The agent failed: it fell.
     Fell,

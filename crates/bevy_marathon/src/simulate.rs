@@ -6,6 +6,7 @@ use crate::characters::{CharacterBatch, CharacterKind, Event, Shove, Slot, spec_
 use crate::command::AgentCommand;
 use crate::error::RagdollError;
 use crate::ground::Ground;
+use crate::lod::Lod;
 use crate::marathon::{Marathon, RagdollState};
 use crate::pose;
 use crate::ragdoll::{
@@ -142,14 +143,19 @@ pub(crate) fn take_in(
         (Option<&CharacterPolicy>, Option<&Opponent>),
         (Option<&Controls>, Option<&Held>),
         Option<&AgentCommand>,
-        Ref<Restart>,
+        (Ref<Restart>, &Lod),
         Option<Ref<Physique>>,
         Option<Ref<LaidGround>>,
     )>,
 ) {
-    for (key, anatomy, (policy, opponent), (controls, held), command, restart, physique, laid) in &ragdolls {
+    for (key, anatomy, (policy, opponent), (controls, held), command, (restart, lod), physique, laid) in &ragdolls {
+        let woken = marathon.kinds.get_mut(key.kind).is_some_and(|kind| kind.set_lod((key.batch, key.lane), *lod));
+        // what changes meanwhile is taken in when it wakes up
+        if *lod == Lod::Asleep {
+            continue;
+        }
         let Some(batch) = marathon.batch(*key) else { continue };
-        if let Some(LaidGround(elevations)) = laid.filter(|laid| laid.is_changed()).as_deref()
+        if let Some(LaidGround(elevations)) = laid.filter(|laid| woken || laid.is_changed()).as_deref()
             && let Err(error) = batch.lay(key.lane, elevations)
         {
             error!("a LaidGround cannot be laid: {error}");
@@ -160,7 +166,7 @@ pub(crate) fn take_in(
         {
             error!("an AgentCommand cannot be followed: {error}");
         }
-        if let Some(physique) = physique.filter(|p| p.is_changed()) {
+        if let Some(physique) = physique.filter(|p| woken || p.is_changed()) {
             let (v, model) = (&physique.0, &anatomy.model);
             if v.mass.len() == model.bodies.len() && v.strength.len() == model.nu {
                 batch.vary(key.lane, v);
@@ -237,7 +243,7 @@ pub(crate) fn push(
             None => [0.0; 3],
         };
         let decisions = (push.seconds / anatomy.dt).round().max(1.0) as u64;
-        if let Some(slot) = marathon.slot_mut(*key) {
+        if let Some(slot) = marathon.slot_mut(*key).filter(|slot| slot.asleep.is_none()) {
             slot.push(Shove { body: push.body, force, torque, decisions });
         }
     }
@@ -271,9 +277,10 @@ pub(crate) fn simulate(mut marathon: ResMut<Marathon>, time: Res<Time<Fixed>>) {
             }
             let due = until.saturating_sub(first).as_nanos().div_ceil(period.as_nanos()) as u32;
             kind.time += period * due;
-            let lanes = kind.batches.iter().flat_map(|batch| &batch.lanes).flatten().count();
+            let lanes = kind.batches.iter().flat_map(|batch| &batch.lanes).flatten();
+            let lanes = lanes.filter(|slot| slot.asleep.is_none()).count();
             decisions += u64::from(due) * lanes as u64;
-            for batch in kind.batches.iter_mut().filter(|batch| !batch.is_empty()) {
+            for batch in kind.batches.iter_mut().filter(|batch| batch.has_awake()) {
                 scope.spawn(async move {
                     for decision in 1..=due {
                         batch.decide(first + period * decision);

@@ -1,6 +1,9 @@
 //! The examples run in an app without a window and without a graphics card, and the first program of the README is as short as it says.
 #![cfg(feature = "window")]
 
+#[allow(dead_code, reason = "its window stays closed")]
+#[path = "../examples/crowd.rs"]
+mod crowd;
 #[allow(dead_code, reason = "its command line is left out")]
 #[path = "../examples/headless_server.rs"]
 mod headless_server;
@@ -9,6 +12,9 @@ mod own_character;
 #[allow(dead_code, reason = "its window stays closed")]
 #[path = "../examples/ragdoll.rs"]
 mod ragdoll;
+#[allow(dead_code, reason = "it plays for longer")]
+#[path = "../examples/rollback.rs"]
+mod rollback;
 #[allow(dead_code, reason = "its window stays closed")]
 #[path = "../examples/wear_a_skin.rs"]
 mod wear_a_skin;
@@ -68,6 +74,27 @@ fn the_figure_is_worn() {
     });
     let refused = app.world_mut().query::<&UnfitSkin>().iter(app.world()).next();
     assert!(refused.is_none(), "{refused:?}");
+}
+
+#[test]
+fn the_crowd_walks_and_those_far_away_decide_less() {
+    let mut app = windowless(crowd::crowd);
+    run_until(&mut app, "64 characters that have been on their way for 3 s", |world| {
+        let walks = |episode: &Episode| episode.number > 1 || episode.seconds > 3.0;
+        world.query::<&Episode>().iter(world).filter(|episode| walks(episode)).count() == 64
+    });
+    let world = app.world_mut();
+    let levels: Vec<Lod> = world.query::<&Lod>().iter(world).copied().collect();
+    assert!(levels.contains(&Lod::Full) && levels.contains(&Lod::HalfRate), "{levels:?}");
+    let stood = world.query::<&Episode>().iter(world).filter(|episode| episode.number == 1).count();
+    assert!(stood >= 58, "{stood} of 64 have not fallen");
+}
+
+#[test]
+fn the_rolled_back_peer_has_the_bits_of_the_referee() -> Result<(), Box<dyn std::error::Error>> {
+    let outcome = rollback::play(300)?;
+    assert!(outcome.same_bits && outcome.rollbacks > 5 && outcome.replayed > 25, "{outcome:?}");
+    Ok(())
 }
 
 #[test]

@@ -330,3 +330,64 @@ fn a_block_moves_with_what_its_agents_have_of_their_own() {
         }
     }
 }
+
+/// One agent moves to another number of another environment, with other neighbors, threads and widths. Neither its new
+/// neighbors nor the agent change a bit.
+#[test]
+fn an_agent_continues_among_others() {
+    for id in ["Hopper-v0", "MarathonManController-v0", "Ant-v0"] {
+        let mut env = make(id, 20, 1, None, Autoreset::SameStep);
+        play(&mut env, BEFORE, 0.8, |_, _| {});
+        let saved = env.save_agent(17).expect("there are 20");
+        assert_eq!(env.save_agent(17).expect("there are 20"), saved);
+        let others = isas().filter(|isa| *isa != Isa::F64).map(|isa| make(id, 40, 2, Some(isa), Autoreset::SameStep));
+        for mut other in others {
+            play(&mut other, 9, 0.5, |_, _| {});
+            let neighbors = [1, 2, 4, 20].map(|agent| other.save_agent(agent).expect("there are 40"));
+            other.load_agent(3, &saved).unwrap_or_else(|e| panic!("{e}"));
+            assert!(other.save_agent(3).expect("there are 40") == saved, "{id}: saving what was loaded");
+            let unchanged = [1, 2, 4, 20].map(|agent| other.save_agent(agent).expect("there are 40"));
+            assert!(unchanged == neighbors, "{id}: its neighbors changed");
+            // the same actions for both from here on
+            let mut here = make(id, 20, 1, None, Autoreset::SameStep);
+            play(&mut here, BEFORE, 0.8, |_, _| {});
+            let act = env.spec().act;
+            let (mut ours, mut theirs) = (here.buffers(), other.buffers());
+            for decision in 0..AFTER {
+                let action: Vec<f32> = (0..act).map(|k| 0.7 * ((decision * 7 + k * 3) as f32).sin()).collect();
+                let at = |agent: usize, agents: usize| {
+                    let mut all = vec![0.0; agents * act];
+                    all[agent * act..][..act].copy_from_slice(&action);
+                    all
+                };
+                here.step(&at(17, 20), &mut ours).expect("the arrays fit");
+                other.step(&at(3, 40), &mut theirs).expect("the arrays fit");
+                let n = env.spec().obs;
+                assert!(ours.obs[17 * n..18 * n] == theirs.obs[3 * n..4 * n], "{id}: decision {decision}");
+                assert_eq!(ours.reward[17].to_bits(), theirs.reward[3].to_bits(), "{id}: decision {decision}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_wrong_agent_is_refused_and_changes_nothing() {
+    let mut env = make("hopper", 3, 1, None, Autoreset::SameStep);
+    play(&mut env, 5, 0.5, |_, _| {});
+    let (good, before) = (env.save_agent(1).expect("there are 3"), env.save());
+    let walker = make("walker", 1, 1, None, Autoreset::SameStep).save_agent(0).expect("there is one");
+    let older = [b"MRTHNa00", &good[8..]].concat();
+    for (bytes, complaint) in [
+        (&good[..good.len() - 1], "it is damaged or cut short: its checksum is"),
+        (&[], "it has 0 bytes, expected a snapshot of an agent"),
+        (&before, "it does not begin with the mark of an agent"),
+        (&older, "its format is 'MRTHNa00', expected 'MRTHNa01': it was saved by another version of Marathon"),
+        (&walker, "it is an agent of 'Walker2d-v0', expected one of 'Hopper-v0'"),
+    ] {
+        let error = env.load_agent(1, bytes).unwrap_err().to_string();
+        assert!(error.contains(complaint), "{error}");
+        assert!(env.save() == before, "nothing has changed");
+    }
+    assert!(env.load_agent(3, &good).unwrap_err().to_string().contains("less than the number of agents"));
+    assert!(env.save_agent(3).is_err());
+}

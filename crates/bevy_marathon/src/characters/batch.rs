@@ -14,7 +14,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// Steps sixteen ragdolls.
-enum Engine {
+pub(super) enum Engine {
     /// With a task.
     Env(Box<VecEnv>),
     /// Without.
@@ -23,14 +23,14 @@ enum Engine {
 
 /// Sixteen lanes.
 pub(crate) struct CharacterBatch {
-    engine: SyncCell<Engine>,
+    pub(super) engine: SyncCell<Engine>,
     pub lanes: Vec<Option<Slot>>,
-    model: Arc<Model>,
-    n_act: usize,
+    pub(super) model: Arc<Model>,
+    pub(super) n_act: usize,
     dt: f64,
     roles: Vec<Role>,
-    obs: Vec<f32>,
-    action: Vec<f32>,
+    pub(super) obs: Vec<f32>,
+    pub(super) action: Vec<f32>,
     /// Their last actions, with which roles go on that do not decide now.
     last: Vec<f32>,
     /// Buffers for a role's observations and actions.
@@ -155,9 +155,12 @@ impl CharacterBatch {
             }
             Engine::Free(batch, _) => batch.reset(lane, qpos, qvel),
         }
+        let sleeps = self.lanes[lane].as_ref().is_some_and(|slot| slot.asleep.is_some());
+        let asleep = sleeps.then(|| self.lane_state(lane));
         // what was before it is not on the way there
         if let Some(slot) = &mut self.lanes[lane] {
             slot.history.clear();
+            slot.asleep = asleep;
         }
         self.record(lane, time, true);
     }
@@ -179,11 +182,9 @@ impl CharacterBatch {
 
     /// Appends the state of a lane and its command to its history.
     fn record(&mut self, lane: usize, time: Duration, fresh: bool) {
-        let mut grounds = Vec::new();
+        let grounds = self.grounds(lane);
         let (qpos, qvel, command, reference) = match self.engine.get() {
             Engine::Env(env) => {
-                // lanes and fields exist
-                grounds.extend((0..self.model.hfields.len()).filter_map(|field| env.ground(lane, field).ok()));
                 let command = env.context(lane).map(|context| context.command()).unwrap_or_default();
                 let reference = env.reference(lane).unwrap_or_default();
                 env.state(lane).map(|s| (s.qpos, s.qvel, command, reference)).unwrap_or_default()
@@ -220,6 +221,9 @@ impl CharacterBatch {
             }
         }
         for lane in 0..BLOCK {
+            if self.lanes[lane].as_ref().is_some_and(|slot| slot.asleep.is_some()) {
+                continue;
+            }
             let fresh = self.judge(lane);
             if fresh {
                 self.reset(lane);
@@ -258,7 +262,12 @@ impl CharacterBatch {
                 // one of its roles, and a place for each of its agents
                 let _ = env.decides(*number, &mut decides);
             }
-            acting.act_rows(seen, None, &mut scratch[..own * BLOCK]);
+            for (decides, slot) in decides.iter_mut().zip(lanes.iter()) {
+                *decides &= !slot.as_ref().is_some_and(Slot::holds);
+            }
+            if (0..BLOCK).any(|lane| decides[lane] && has(&lanes[lane], *number, acting.policy())) {
+                acting.act_rows(seen, None, &mut scratch[..own * BLOCK]);
+            }
             for lane in (0..BLOCK).filter(|lane| has(&lanes[*lane], *number, acting.policy())) {
                 let of_role = lane * n + role.act.start..lane * n + role.act.end;
                 action[of_role.clone()].copy_from_slice(match decides[lane] {

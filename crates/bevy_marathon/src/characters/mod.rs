@@ -4,9 +4,12 @@
 //! kind has a clock, ahead of the game's by at most one decision, so that a frame always lies between two states.
 
 mod batch;
+mod saved;
+mod sleep;
 mod slot;
 
 pub(crate) use batch::CharacterBatch;
+pub(crate) use saved::{KindIdentity, LaneState};
 pub use slot::PoseSample;
 pub(crate) use slot::{Event, Shove, Slot};
 
@@ -19,7 +22,7 @@ use marathon_envs::Spec;
 use marathon_physics::Model;
 use marathon_physics::lanes::Isa;
 use marathon_runs::TaskConfig;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 /// Seconds that a prefab is simulated for at a time, about.
@@ -49,6 +52,12 @@ pub(crate) struct CharacterKind {
     /// Time of the newest states.
     pub time: Duration,
     pub batches: Vec<CharacterBatch>,
+    /// Ragdolls have fallen asleep or woken up since the lanes were packed.
+    pub unpacked: bool,
+    /// Ragdolls that have entered so far.
+    entered: u64,
+    /// Mark of its snapshots, once there is one.
+    identity: OnceLock<Arc<KindIdentity>>,
 }
 
 impl CharacterKind {
@@ -73,6 +82,9 @@ impl CharacterKind {
             spec: Some(Arc::new(spec)),
             time,
             batches: Vec::new(),
+            unpacked: false,
+            entered: 0,
+            identity: OnceLock::new(),
         })
     }
 
@@ -92,11 +104,15 @@ impl CharacterKind {
             spec: None,
             time,
             batches: Vec::new(),
+            unpacked: false,
+            entered: 0,
+            identity: OnceLock::new(),
         }
     }
 
     /// Gives a ragdoll a free lane.
-    pub fn admit(&mut self, slot: Slot) -> Result<(usize, usize), RagdollError> {
+    pub fn admit(&mut self, mut slot: Slot) -> Result<(usize, usize), RagdollError> {
+        (slot.entered, self.entered) = (self.entered, self.entered + 1);
         let free = |batch: &CharacterBatch| batch.lanes.iter().position(Option::is_none);
         let batch = match self.batches.iter().position(|batch| free(batch).is_some()) {
             Some(batch) => batch,

@@ -1,26 +1,40 @@
 //! A ragdoll in its lane: its policies, its episode, and the states that frames are drawn from.
 
+use super::LaneState;
+use crate::lod::Lod;
 use crate::ragdoll::{Controls, End, Episode, Held, Restart};
 use bevy::prelude::*;
 use marathon_learn::Policy;
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A ragdoll in its lane.
-#[derive(Debug)]
+/// A ragdoll in its lane. A snapshot has all of it, but for what the components of the ragdoll say at every tick.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Slot {
+    /// Number of the ragdolls that have entered the simulation before it, of its kind.
+    pub entered: u64,
     pub seed: u64,
     pub number: u64,
     /// The policies of the task's first and second role.
+    #[serde(skip)]
     pub policies: [Option<Arc<Policy>>; 2],
+    #[serde(skip)]
     pub controls: Option<Controls>,
+    #[serde(skip)]
     pub held: Option<Held>,
+    #[serde(skip)]
+    pub lod: Lod,
+    /// Its state while it sleeps.
+    pub asleep: Option<LaneState>,
     /// The command that replaces its own schedule.
     pub command: Option<Vec<f64>>,
+    #[serde(skip)]
     pub restart: Restart,
     pub episode: Episode,
-    /// Elevations of its model's height fields.
+    /// Elevations of its model's height fields. The bytes of a snapshot have them in the state of the physics.
+    #[serde(skip)]
     pub grounds: Arc<Vec<Vec<f32>>>,
     /// States that frames are drawn from, oldest first.
     pub history: VecDeque<PoseSample>,
@@ -33,7 +47,7 @@ pub(crate) struct Slot {
 }
 
 /// A state of a ragdoll at a time, see [`Marathon::history`](crate::Marathon::history).
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PoseSample {
     /// Time of the fixed clock.
     pub time: Duration,
@@ -49,12 +63,13 @@ pub struct PoseSample {
     pub action: Vec<f32>,
     /// Command that the agent observes, in the order of [`Spec::command`](marathon_envs::Spec::command).
     pub command: Vec<f64>,
-    /// Elevations of each height field, m above the field's zero, by rows.
+    /// Elevations of each height field, m above the field's zero, by rows. The bytes of a snapshot have only the newest.
+    #[serde(skip)]
     pub grounds: Arc<Vec<Vec<f32>>>,
 }
 
 /// A push in the axes of the physics.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(crate) struct Shove {
     pub body: usize,
     pub force: [f64; 3],
@@ -64,7 +79,7 @@ pub(crate) struct Shove {
 }
 
 /// An event of a ragdoll.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) enum Event {
     Foot { foot: usize, down: bool },
     Ended(End, Episode),
@@ -74,12 +89,15 @@ pub(crate) enum Event {
 impl Slot {
     pub fn new((seed, number): (u64, u64), restart: Restart) -> Self {
         Slot {
+            entered: 0,
             seed,
             number,
             restart,
             policies: [None, None],
             controls: None,
             held: None,
+            lod: Lod::Full,
+            asleep: None,
             command: None,
             episode: Episode::default(),
             grounds: Arc::default(),
@@ -101,6 +119,11 @@ impl Slot {
         self.begin_now = true;
     }
 
+    /// Whether it keeps its last action, at half the rate of its task.
+    pub(super) fn holds(&self) -> bool {
+        self.asleep.is_some() || self.lod == Lod::HalfRate && self.episode.decisions % 2 == 1
+    }
+
     /// Its state at a time: the states before and after, and the share of the later one.
     pub fn between(&self, time: Duration) -> Option<(&PoseSample, &PoseSample, f64)> {
         let later = self.history.iter().position(|s| s.time >= time).unwrap_or(self.history.len().saturating_sub(1));
@@ -109,6 +132,14 @@ impl Slot {
         let span = b.time.saturating_sub(a.time).as_secs_f64();
         let share = if span > 0.0 { (time.saturating_sub(a.time).as_secs_f64() / span).min(1.0) } else { 1.0 };
         Some((a, b, share))
+    }
+
+    /// Moves its states in time, so that the newest is that of `time`.
+    pub(super) fn retime(&mut self, time: Duration) {
+        let newest = self.history.back().map_or(time, |sample| sample.time);
+        for sample in &mut self.history {
+            sample.time = time.saturating_sub(newest.saturating_sub(sample.time));
+        }
     }
 
     /// Removes states that no frame from this time on needs.

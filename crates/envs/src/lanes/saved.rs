@@ -74,6 +74,17 @@ fn wrong_mark(bytes: &[u8]) -> String {
     }
 }
 
+/// Reads one agent that [`add`] wrote, and returns it with the bytes after it.
+pub(crate) fn read_agent<'a>(
+    model: &Model,
+    spec: &Spec,
+    memory: usize,
+    mut bytes: &'a [u8],
+) -> Result<(Saved, &'a [u8]), EnvError> {
+    let saved = agent(model, spec, memory, &mut bytes);
+    Ok((saved.ok_or_else(|| EnvError::Snapshot("it ends too early or belongs to another model".into()))?, bytes))
+}
+
 fn agent(model: &Model, spec: &Spec, memory: usize, bytes: &mut &[u8]) -> Option<Saved> {
     let life = life(bytes)?;
     let (physics, rest) = PhysicsState::read_from(model, bytes)?;

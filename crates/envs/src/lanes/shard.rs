@@ -73,6 +73,17 @@ impl Life {
         Life { id: EpisodeId { seed, agent, episode: 0 }, steps: 0 }
     }
 
+    /// The numbers of a snapshot.
+    fn words(&self) -> [u64; 4] {
+        let Life { id: EpisodeId { seed, agent, episode }, steps } = *self;
+        [seed, agent, episode, steps]
+    }
+
+    /// The life of the numbers of a snapshot.
+    fn of_words([seed, agent, episode, steps]: [u64; 4]) -> Self {
+        Life { id: EpisodeId { seed, agent, episode }, steps }
+    }
+
     /// The episode after the present one.
     fn next(&self) -> EpisodeId {
         EpisodeId { episode: self.id.episode + 1, ..self.id }
@@ -197,9 +208,8 @@ impl<T: Real> Shard for LaneShard<T> {
         let Block { groups, lives } = &self.blocks[block];
         saved::begin(bytes);
         for (i, life) in lives.iter().enumerate() {
-            let Life { id: EpisodeId { seed, agent, episode }, steps } = *life;
             let state = groups[i / T::LANES].save(&self.task.data.sim, i % T::LANES);
-            saved::add(bytes, &Saved { life: [seed, agent, episode, steps], state });
+            saved::add(bytes, &Saved { life: life.words(), state });
         }
     }
 
@@ -208,8 +218,7 @@ impl<T: Real> Shard for LaneShard<T> {
         let Block { groups, lives } = &mut self.blocks[block];
         let (agents, rest) = saved::read(&task.data.blueprint.model, &task.data.spec, task.data.facts.memory, bytes)?;
         for (i, (life, saved)) in lives.iter_mut().zip(&agents).enumerate() {
-            let [seed, agent, episode, steps] = saved.life;
-            *life = Life { id: EpisodeId { seed, agent, episode }, steps };
+            *life = Life::of_words(saved.life);
             groups[i / T::LANES].load(&task.data.sim, i % T::LANES, &saved.state);
         }
         Ok(rest)
@@ -261,6 +270,21 @@ impl<T: Real> AgentShard for LaneShard<T> {
         group.commands.begin(lane);
         self.task.begin(group, &mut self.work, 1 << lane);
         Ok(())
+    }
+
+    fn save_agent(&self, agent: usize, bytes: &mut Vec<u8>) {
+        let Block { groups, lives } = &self.blocks[agent / BLOCK];
+        let state = groups[agent % BLOCK / T::LANES].save(&self.task.data.sim, agent % T::LANES);
+        saved::add(bytes, &Saved { life: lives[agent % BLOCK].words(), state });
+    }
+
+    fn load_agent<'a>(&mut self, agent: usize, bytes: &'a [u8]) -> Result<&'a [u8], EnvError> {
+        let TaskData { blueprint, spec, facts, sim, .. } = &self.task.data;
+        let (saved, rest) = saved::read_agent(&blueprint.model, spec, facts.memory, bytes)?;
+        let Block { groups, lives } = &mut self.blocks[agent / BLOCK];
+        lives[agent % BLOCK] = Life::of_words(saved.life);
+        groups[agent % BLOCK / T::LANES].load(sim, agent % T::LANES, &saved.state);
+        Ok(rest)
     }
 
     fn context(&mut self, agent: usize) -> Box<dyn AgentContext + '_> {

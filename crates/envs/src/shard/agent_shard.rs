@@ -30,6 +30,14 @@ pub trait AgentShard: Shard {
     /// # Errors
     /// If lengths are wrong or a number is not finite.
     fn set_state(&mut self, agent: usize, state: &AgentState) -> Result<(), EnvError>;
+    /// Appends the complete state of one agent to `bytes`, see [`Shard::save`].
+    fn save_agent(&self, agent: usize, bytes: &mut Vec<u8>);
+    /// Restores the state that [`AgentShard::save_agent`] wrote, and returns the rest of `bytes`. Other agents are
+    /// unchanged.
+    ///
+    /// # Errors
+    /// If they do not begin with an agent of this task. Then nothing has changed.
+    fn load_agent<'a>(&mut self, agent: usize, bytes: &'a [u8]) -> Result<&'a [u8], EnvError>;
     /// Controls of an agent during its last decision, in the actuators' units.
     fn ctrl(&self, agent: usize) -> Vec<f64>;
     /// Inputs of an agent besides actions: commands, pushes, constants and ground.

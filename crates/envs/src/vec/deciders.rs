@@ -55,6 +55,24 @@ impl Deciders {
         self.turns.get(block * self.roles + role).unwrap_or(&Turn::START)
     }
 
+    /// The turns of an agent of a block: a byte for each role, with bits for deciding and for the two ways of leaving.
+    pub fn save(&self, block: usize, lane: usize) -> impl Iterator<Item = u8> {
+        let bit = move |mask: u16, at: u8| ((mask >> lane & 1) as u8) << at;
+        self.turns[block * self.roles..][..self.roles].iter().map(
+            move |Turn { decides, leaves: [failed, finished] }| bit(*decides, 0) | bit(*failed, 1) | bit(*finished, 2),
+        )
+    }
+
+    /// Restores the turns of an agent. `turns` has a byte for each role.
+    pub fn load(&mut self, block: usize, lane: usize, turns: &[u8]) {
+        for (turn, byte) in self.of(block).iter_mut().zip(turns) {
+            let [failed, finished] = &mut turn.leaves;
+            for (at, mask) in [&mut turn.decides, failed, finished].into_iter().enumerate() {
+                *mask = *mask & !(1 << lane) | u16::from(byte >> at & 1) << lane;
+            }
+        }
+    }
+
     fn of(&mut self, block: usize) -> &mut [Turn] {
         &mut self.turns[block * self.roles..][..self.roles]
     }

@@ -375,7 +375,7 @@ impl VecEnv {
         if found == expected { Ok(()) } else { Err(EnvError::Shape { what: what.into(), found, expected }) }
     }
 
-    fn check_agent(&self, agent: usize) -> Result<(), EnvError> {
+    pub(super) fn check_agent(&self, agent: usize) -> Result<(), EnvError> {
         if agent < self.agents {
             return Ok(());
         }
