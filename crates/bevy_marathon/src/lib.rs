@@ -48,6 +48,7 @@
 //!
 //! Without features nothing draws and no renderer is compiled, as a server needs it.
 
+mod actuation;
 pub mod asset;
 pub mod axes;
 mod characters;
@@ -55,23 +56,33 @@ mod command;
 mod direction;
 mod error;
 mod ground;
+mod limbs;
 #[cfg(feature = "render")]
 pub mod look;
 mod marathon;
+mod messages;
+mod mode;
 mod plugin;
 pub mod pose;
 mod ragdoll;
+mod reactions;
+mod report;
 mod simulate;
+mod strength;
 
 pub use asset::{PolicyAsset, RagdollPrefab};
 pub use characters::{PoseSample, spec_of_role};
 pub use command::AgentCommand;
 pub use direction::MoveDirection;
-pub use error::{CommandError, RagdollError};
+pub use error::{CommandError, RagdollError, StrengthError};
 pub use ground::{Ground, TRACK_HALF_WIDTH};
 pub use marathon::{Marathon, RagdollState};
+pub use messages::*;
+pub use mode::RagdollMode;
 pub use plugin::{MarathonPlugin, MarathonSystems};
 pub use ragdoll::*;
+pub use reactions::HitReactions;
+pub use strength::LimbStrength;
 
 /// The names that most apps need.
 pub mod prelude {
@@ -80,11 +91,12 @@ pub mod prelude {
         ErrorColors, FollowCamera, FollowCameraPlugin, Ghost, GhostPlugin, LookPlugin, Marks, MarksPlugin, Quality,
         SceneryPlugin, Skin, SkinPlugin, Tint,
     };
+    pub use crate::messages::*;
     pub use crate::plugin::{MarathonPlugin, MarathonSystems};
     pub use crate::ragdoll::*;
     pub use crate::{
-        AgentCommand, CommandError, Ground, Marathon, MoveDirection, PolicyAsset, RagdollError, RagdollPrefab,
-        RagdollState,
+        AgentCommand, CommandError, Ground, HitReactions, LimbStrength, Marathon, MoveDirection, PolicyAsset,
+        RagdollError, RagdollMode, RagdollPrefab, RagdollState, StrengthError,
     };
     pub use marathon_physics::Variation;
     pub use marathon_runs::TaskConfig;
