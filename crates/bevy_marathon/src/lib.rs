@@ -62,6 +62,7 @@ pub mod look;
 mod marathon;
 mod messages;
 mod mode;
+mod place;
 mod plugin;
 pub mod pose;
 mod ragdoll;
@@ -79,6 +80,7 @@ pub use ground::{Ground, TRACK_HALF_WIDTH};
 pub use marathon::{Marathon, RagdollState};
 pub use messages::*;
 pub use mode::RagdollMode;
+pub use place::CharacterPose;
 pub use plugin::{MarathonPlugin, MarathonSystems};
 pub use ragdoll::*;
 pub use reactions::HitReactions;
@@ -95,8 +97,8 @@ pub mod prelude {
     pub use crate::plugin::{MarathonPlugin, MarathonSystems};
     pub use crate::ragdoll::*;
     pub use crate::{
-        AgentCommand, CommandError, Ground, HitReactions, LimbStrength, Marathon, MoveDirection, PolicyAsset,
-        RagdollError, RagdollMode, RagdollPrefab, RagdollState, StrengthError,
+        AgentCommand, CharacterPose, CommandError, Ground, HitReactions, LimbStrength, Marathon, MoveDirection,
+        PolicyAsset, RagdollError, RagdollMode, RagdollPrefab, RagdollState, StrengthError,
     };
     pub use marathon_physics::Variation;
     pub use marathon_runs::TaskConfig;

@@ -102,7 +102,7 @@ impl Limbs {
         self.limbs[actuator].body.is_some_and(|body| self.bodies[body].leg)
     }
 
-    /// Number of bodies on the way from a body to that which an actuator moves. `None` without a way.
+    /// Number of joints between a body and the body that an actuator moves. `None` if nothing connects them.
     pub fn distance(&self, actuator: usize, body: usize) -> Option<usize> {
         let up = |mut body: usize| {
             let mut way = vec![body];

@@ -2,10 +2,10 @@
 
 use bevy::prelude::*;
 
-/// What a [`Ragdoll`](crate::Ragdoll) does with its actuators. The plugin writes it after every decision, and an app can set it.
+/// Use that a [`Ragdoll`](crate::Ragdoll) makes of its actuators. The plugin writes it after every decision, and an app can set it.
 ///
-/// An app that sets `Limp` takes all strength from the character, as after a fall: its episode stands still until the app
-/// sets `Powered`, or [`RestartNow`](crate::RestartNow) begins the next one. `Powered` gives the character back to its
+/// An app that sets `Limp` takes all strength from the character, as after a fall. Its episode then stands still until the
+/// app sets `Powered`, or [`RestartNow`](crate::RestartNow) begins the next one. `Powered` gives the character back to its
 /// policy, wherever it lies. One whose task goes on after a fall then gets up. For the others, the task fails again, and
 /// [`Restart`](crate::Restart) says what follows.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect)]

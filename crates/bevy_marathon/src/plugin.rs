@@ -10,6 +10,7 @@ use crate::messages::{
     SkillStarted, TargetReached,
 };
 use crate::mode::RagdollMode;
+use crate::place::{self, CharacterPose};
 use crate::ragdoll::{
     CharacterPolicy, Controls, Episode, Held, LaidGround, Opponent, OwnGround, Part, Physique, Ragdoll, Restart, Target,
 };
@@ -36,7 +37,7 @@ pub enum MarathonSystems {
     Simulate,
     /// [`crate::Episode`]s and messages are written. Read them after this.
     Report,
-    /// In [`RunFixedMainLoop`], after the fixed loop: the transforms of all parts, at the time of the frame.
+    /// In [`RunFixedMainLoop`], after the fixed loop: the transforms of all parts and [`crate::CharacterPose`]s, at the time of the frame.
     Show,
 }
 
@@ -64,7 +65,7 @@ impl Plugin for MarathonPlugin {
                     (report::report, simulate::face_targets).chain().in_set(MarathonSystems::Report),
                 ),
             )
-            .add_systems(RunFixedMainLoop, simulate::show.in_set(MarathonSystems::Show))
+            .add_systems(RunFixedMainLoop, (simulate::show, place::show).in_set(MarathonSystems::Show))
             .add_observer(simulate::dismiss);
     }
 }
@@ -102,5 +103,6 @@ fn register_types(app: &mut App) {
         .register_type::<Restart>()
         .register_type::<OwnGround>()
         .register_type::<Episode>()
+        .register_type::<CharacterPose>()
         .register_type::<Part>();
 }

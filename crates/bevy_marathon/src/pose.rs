@@ -1,6 +1,6 @@
 //! Poses: the entities of a ragdoll's parts, and the transforms that a configuration `qpos` gives them.
 
-use crate::axes::place_to_game;
+use crate::axes::{place_to_game, to_game};
 use crate::ragdoll::{Anatomy, Part};
 use bevy::prelude::*;
 use marathon_physics::Model;
@@ -69,6 +69,38 @@ pub fn velocity([before, after]: &[Pose; 2], point: impl Fn(&Pose) -> [f64; 3]) 
     std::array::from_fn(|i| (b[i] - a[i]) / (2.0 * MOMENT))
 }
 
+/// Place and velocities of the root body, in the axes of the ragdoll.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RootMotion {
+    /// Transform.
+    pub place: Transform,
+    /// Velocity of the origin of the body, m/s.
+    pub linear: Vec3,
+    /// Angular velocity, rad/s.
+    pub angular: Vec3,
+}
+
+/// Motion of the body that the first joint moves. `None` without a joint, or if a number is not finite.
+pub fn root_motion(model: &Model, qpos: &[f64], qvel: &[f64]) -> Option<RootMotion> {
+    let joint = model.joints.first()?;
+    if let (JointType::Free, [x, y, z, a, b, c, d, ..], [u, v, w, p, q, r, ..]) = (joint.kind, qpos, qvel) {
+        let place = place_to_game([*x, *y, *z], [*a, *b, *c, *d]);
+        // the angular velocity is in the axes of the body
+        let angular = place.rotation * to_game([*p, *q, *r]);
+        return place.is_finite().then_some(RootMotion { place, linear: to_game([*u, *v, *w]), angular });
+    }
+    let around = around(model, qpos, qvel)?;
+    let linear = to_game(velocity(&around, |pose| pose.bodies[joint.body].pos));
+    let [before, after] = around.each_ref().map(|pose| pose.bodies[joint.body]);
+    // twice the vector part of the turn from one to the other; q and -q are the same orientation
+    let ([p, a, b, c], [q, x, y, z]) = (before.quat, after.quat);
+    let sign = if p * q + a * x + b * y + c * z < 0.0 { -1.0 } else { 1.0 };
+    let turn = [p * x - q * a + b * z - c * y, p * y - q * b + c * x - a * z, p * z - q * c + a * y - b * x];
+    let angular = to_game(turn.map(|x| sign * x / MOMENT));
+    let place = place_to_game(after.pos, after.quat);
+    Some(RootMotion { place, linear, angular })
+}
+
 /// A configuration after a moment at a velocity, to first order.
 fn advanced(model: &Model, qpos: &[f64], qvel: &[f64], seconds: f64) -> Vec<f64> {
     let mut q = qpos.to_vec();
@@ -85,8 +117,7 @@ fn advanced(model: &Model, qpos: &[f64], qvel: &[f64], seconds: f64) -> Vec<f64>
         let Some((at, dof)) = turn else { continue };
         if let (Some([w, x, y, z]), Some([a, b, c])) = (q.get(at..at + 4), qvel.get(dof..dof + 3)) {
             // the angular velocity is in the axes of the body: q' = q w / 2
-            let change =
-                [-x * a - y * b - z * c, w * a + y * c - z * b, w * b + z * a - x * c, w * c + x * b - y * a];
+            let change = [-x * a - y * b - z * c, w * a + y * c - z * b, w * b + z * a - x * c, w * c + x * b - y * a];
             for (q, change) in q[at..at + 4].iter_mut().zip(change) {
                 *q += 0.5 * seconds * change;
             }
@@ -184,6 +215,33 @@ mod tests {
         let v = velocity(&around, |pose| pose.geoms[0].pos);
         let expected = [1.0, -1.5, 2.0];
         assert!(v.iter().zip(expected).all(|(v, x)| (v - x).abs() < 1e-6), "{v:?}");
+        Ok(())
+    }
+
+    #[test]
+    fn the_root_moves_as_its_joints_say() -> Result<(), Box<dyn std::error::Error>> {
+        let half = 0.5_f64.sqrt();
+        let free = "<mujoco><worldbody><body><freejoint/><geom size='.1'/></body></worldbody></mujoco>";
+        let plane = "<mujoco><worldbody><body><joint type='slide' axis='1 0 0'/><joint type='slide' axis='0 0 1'/>\
+            <joint axis='0 1 0'/><geom size='.1'/></body></worldbody></mujoco>";
+        // a quarter about z, so that the y axis of the free body is -x of the world
+        for (xml, qpos, qvel, linear, angular) in [
+            (
+                free,
+                &[1.0, 2.0, 3.0, half, 0.0, 0.0, half][..],
+                &[1.0, 0.5, 2.0, 0.0, 3.0, 0.0][..],
+                [1.0, 0.5, 2.0],
+                [-3.0, 0.0, 0.0],
+            ),
+            (plane, &[1.0, 3.0, 0.4][..], &[1.5, -0.5, 2.0][..], [1.5, 0.0, -0.5], [0.0, 2.0, 0.0]),
+        ] {
+            let model = Model::from_xml_str(xml, "root")?;
+            let root = root_motion(&model, qpos, qvel).ok_or("finite numbers")?;
+            let near = |v: Vec3, x: [f64; 3]| v.distance(to_game(x)) < 1e-4;
+            assert!(near(root.linear, linear) && near(root.angular, angular), "{root:?}");
+            let places = places(&model, qpos).ok_or("finite numbers")?;
+            assert!(root.place.translation.distance(places[1].translation) < 1e-3, "{root:?}");
+        }
         Ok(())
     }
 

@@ -12,9 +12,8 @@ const NEGLIGIBLE: f64 = 0.01;
 /// of the body and of its neighbors, which then comes back. The policy acts all the time. [`HitReceived`](crate::HitReceived) reports
 /// the blows.
 ///
-/// A blow that changes the velocity of the body alone by `v`, its impulse over the mass of the body, leaves its actuators
-/// the factor `1 - v / full_speed` of their strength, but at least `softest`. What is taken shrinks by `spread` with each joint away from
-/// the body.
+/// Let `v` be the impulse of a blow over the mass of the body. The actuators of the body keep the factor `1 - v / full_speed` of
+/// their strength, but at least `softest`. The loss shrinks by `spread` with each joint away from the body.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Default, Clone, Debug, PartialEq)]
 pub struct HitReactions {

@@ -1,4 +1,4 @@
-//! What has happened at the decisions, as components and messages.
+//! Results of the decisions, as components and messages.
 
 use crate::axes::to_game;
 use crate::characters::Event;
@@ -69,12 +69,7 @@ impl Writers<'_> {
 /// Writes components and messages.
 pub(crate) fn report(
     mut marathon: ResMut<Marathon>,
-    mut ragdolls: Query<(
-        Entity,
-        &RagdollState,
-        &Anatomy,
-        (&mut Episode, &mut OwnGround, &mut RagdollMode),
-    )>,
+    mut ragdolls: Query<(Entity, &RagdollState, &Anatomy, (&mut Episode, &mut OwnGround, &mut RagdollMode))>,
     transforms: TransformHelper,
     mut writers: Writers,
 ) {

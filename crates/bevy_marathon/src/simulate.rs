@@ -8,6 +8,7 @@ use crate::error::RagdollError;
 use crate::ground::Ground;
 use crate::marathon::{Marathon, RagdollState};
 use crate::messages::{EpisodeBegan, Push, RestartNow, TargetReached};
+use crate::place::CharacterPose;
 use crate::pose;
 use crate::ragdoll::{
     Anatomy, Character, CharacterPolicy, Controls, Episode, Held, LaidGround, Opponent, Part, Physique, Ragdoll,
@@ -119,7 +120,7 @@ fn build(entity: &mut EntityCommands, kind: &CharacterKind, key: RagdollState, c
     let parts = pose::spawn_parts(entity.commands_mut(), &kind.model, ragdoll);
     let anatomy =
         Anatomy { model: kind.model.clone(), spec: kind.spec.clone(), parts, feet: kind.feet.clone(), dt: kind.dt };
-    entity.insert((key, anatomy));
+    entity.insert((key, anatomy, CharacterPose::default()));
     let ranges = kind.spec.as_ref().map_or(&[][..], |spec| &spec.command);
     // a command that was spawned with the ragdoll is kept if it is one of this task
     if !ranges.is_empty() && command.is_none_or(|command| command.ranges() != ranges) {

@@ -16,7 +16,7 @@ const STRONGEST: f64 = 10.0;
 /// # use bevy_marathon::prelude::*;
 /// fn wound(mut character: Single<&mut LimbStrength>) -> Result {
 ///     // all actuators of a body, or one actuator, by name
-///     character.set("left_forearm", 0.2)?;
+///     character.set("left_larm", 0.2)?;
 ///     // and all of them together
 ///     character.whole = 0.8;
 ///     Ok(())

@@ -4,6 +4,9 @@
 #[allow(dead_code, reason = "its command line is left out")]
 #[path = "../examples/headless_server.rs"]
 mod headless_server;
+#[allow(dead_code, reason = "its window stays closed")]
+#[path = "../examples/hit_reactions.rs"]
+mod hit_reactions;
 #[path = "../examples/own_character.rs"]
 mod own_character;
 #[allow(dead_code, reason = "its window stays closed")]
@@ -14,6 +17,7 @@ mod ragdoll;
 mod wear_a_skin;
 
 use bevy::app::Plugins;
+use bevy::ecs::message::MessageCursor;
 use bevy::log::LogPlugin;
 use bevy::prelude::*;
 use bevy::render::RenderPlugin;
@@ -58,6 +62,25 @@ fn the_humanoid_runs() {
         world.query::<&Episode>().iter(world).any(|episode| episode.farthest > 1.0)
     });
     assert_eq!(app.world_mut().query::<&FollowCamera>().iter(app.world()).count(), 1);
+}
+
+#[test]
+fn the_fighter_takes_blows_falls_and_gets_up() {
+    let mut app = windowless(hit_reactions::sparring);
+    let (mut hits, mut falls, mut rises) = (0, 0, 0);
+    let mut cursors = (MessageCursor::default(), MessageCursor::default(), MessageCursor::default());
+    for _ in 0..3000 {
+        app.update();
+        hits += cursors.0.read(app.world().resource::<Messages<HitReceived>>()).count();
+        falls += cursors.1.read(app.world().resource::<Messages<Fell>>()).count();
+        rises += cursors.2.read(app.world().resource::<Messages<GotUp>>()).count();
+        std::thread::sleep(Duration::from_millis(1));
+        if hits > 4 && rises > 0 {
+            break;
+        }
+    }
+    // three blows leave it standing, the fourth does not
+    assert!(hits > 4 && falls == 1 && rises == 1, "{hits} blows, {falls} falls, {rises} times up");
 }
 
 #[test]

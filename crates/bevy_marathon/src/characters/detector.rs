@@ -16,7 +16,7 @@ const FALLS_FREELY: f64 = 0.5;
 /// Value from which a button or a flag of the task is on.
 const ON: f64 = 0.5;
 
-/// What is known of the motion of a kind of character.
+/// Feet, flags and buttons of a kind of character.
 #[derive(Clone, Debug)]
 pub(crate) struct Detector {
     model: Arc<Model>,

@@ -7,13 +7,29 @@ use crate::ragdoll::Episode;
 #[derive(Clone, Debug)]
 pub(crate) enum Event {
     /// A foot: its lowest point, m, and its speed, m/s.
-    Foot { foot: usize, down: bool, point: [f64; 3], speed: f64 },
-    Landed { speed: f64, seconds: f64 },
+    Foot {
+        foot: usize,
+        down: bool,
+        point: [f64; 3],
+        speed: f64,
+    },
+    Landed {
+        speed: f64,
+        seconds: f64,
+    },
     /// A button of the command takes effect, or no longer.
-    Skill { button: usize, on: bool },
-    Fell { prone: bool },
+    Skill {
+        button: usize,
+        on: bool,
+    },
+    Fell {
+        prone: bool,
+    },
     GotUp,
-    Hit { body: usize, impulse: [f64; 3] },
+    Hit {
+        body: usize,
+        impulse: [f64; 3],
+    },
     Ended(End, Episode),
     Began(u64),
 }

@@ -129,7 +129,7 @@ impl Slot {
         self.pushes.push(shove);
     }
 
-    /// What it does with its actuators.
+    /// Use that it makes of its actuators.
     pub fn mode(&self) -> RagdollMode {
         match () {
             () if self.is_limp() => RagdollMode::Limp,
