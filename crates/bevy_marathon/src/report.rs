@@ -67,6 +67,7 @@ impl Writers<'_> {
 }
 
 /// Writes components and messages.
+#[expect(clippy::type_complexity, reason = "a query names what it writes")]
 pub(crate) fn report(
     mut marathon: ResMut<Marathon>,
     mut ragdolls: Query<(Entity, &RagdollState, &Anatomy, (&mut Episode, &mut OwnGround, &mut RagdollMode))>,

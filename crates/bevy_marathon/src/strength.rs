@@ -95,7 +95,8 @@ impl LimbStrength {
     /// Factor of an actuator.
     pub(crate) fn factor(&self, actuator: usize) -> f64 {
         let own = self.factors.get(actuator).copied().unwrap_or(1.0);
-        // reflection can set any number; not a number becomes 0
-        (self.whole * own).max(0.0).min(STRONGEST)
+        // reflection can set any number
+        let factor = self.whole * own;
+        if factor.is_nan() { 0.0 } else { factor.clamp(0.0, STRONGEST) }
     }
 }

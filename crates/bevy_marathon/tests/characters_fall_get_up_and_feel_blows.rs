@@ -44,12 +44,14 @@ fn hear(
     heard.hits.extend(hits.read());
 }
 
-/// An app with a character of an agent and its policy.
+/// An app with a character of an agent and its policy, which begins standing.
 fn app_with(agent: &str, frame: Duration, more: impl Bundle) -> (App, Entity) {
     let mut app = app(frame);
     app.init_resource::<Heard>().add_systems(FixedUpdate, hear.after(MarathonSystems::Report));
-    let policy = CharacterPolicy(app.world_mut().resource_mut::<Assets<PolicyAsset>>().add(policy(agent)));
-    let character = app.world_mut().spawn((Ragdoll::agent(agent), policy, more)).id();
+    let policy = policy(agent);
+    let task_config = TaskConfig::of_policy(policy.meta()).starting_first().expect("the agent exists");
+    let policy = CharacterPolicy(app.world_mut().resource_mut::<Assets<PolicyAsset>>().add(policy));
+    let character = app.world_mut().spawn((Ragdoll::agent(agent).with_task_config(task_config), policy, more)).id();
     (app, character)
 }
 
@@ -87,7 +89,7 @@ fn blow(app: &mut App, ragdoll: Entity, body: &str, impulse: Vec3) {
     app.world_mut().write_message(Push { ragdoll, body, force: impulse / 0.1, at: None, seconds: 0.1 });
 }
 
-/// Until it may be pushed around without an end of the time.
+/// An episode without a time limit.
 fn untimed() -> Restart {
     Restart { on_time_up: false, ..default() }
 }
@@ -150,6 +152,7 @@ fn a_plane_character_without_numbered_skills_tells_its_jump() -> Result<(), Box<
     let (mut app, character) = app_with(agent, FRAME, (command(agent, &[("velocity", 0.0)])?, untimed()));
     frames(&mut app, 1.0);
     assert!(heard(&app).skills.is_empty());
+    *app.world_mut().resource_mut::<Heard>() = Heard::default();
     app.world_mut().get_mut::<AgentCommand>(character).ok_or("it takes commands")?.set("jump", 1.0)?;
     run_until(&mut app, 200, "the landing of a jump", |world| !world.resource::<Heard>().landed.is_empty());
     app.world_mut().get_mut::<AgentCommand>(character).ok_or("it takes commands")?.rest();
@@ -214,7 +217,7 @@ fn one_whose_task_ends_with_a_fall_begins_again() {
     frames(&mut app, 0.3);
     assert_eq!((heard(&app).fell.len(), mode(&app, ragdoll)), (1, RagdollMode::Powered));
     assert!(app.world().get::<Episode>(ragdoll).is_some_and(|episode| episode.number == 2));
-    // after a fall it lies limp; who powers it begins the next episode
+    // after a fall it lies limp, and `Powered` begins the next episode
     app.world_mut()
         .entity_mut(ragdoll)
         .insert((Restart { after_fall: f64::INFINITY, on_time_up: false }, RagdollMode::Limp));
