@@ -107,7 +107,7 @@ pub struct Held(pub Vec<Option<f32>>);
 #[reflect(Component, Clone, Debug, PartialEq)]
 pub struct LaidGround(pub Vec<f32>);
 
-/// A place to run to. At the start of every episode the ragdoll is turned towards it; [`TargetReached`] tells of the
+/// A place to run to. At the start of every episode the ragdoll is turned towards it; [`TargetReached`](crate::TargetReached) tells of the
 /// arrival.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Clone, Debug, PartialEq)]
