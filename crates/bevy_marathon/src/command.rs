@@ -49,23 +49,45 @@ impl AgentCommand {
     /// # Errors
     /// If the task has no number of this name, or the value is not in its range. The command does not change then.
     pub fn set(&mut self, name: &str, value: f64) -> Result<(), CommandError> {
-        let Some(index) = self.ranges.iter().position(|range| range.name == name) else {
-            let (name, known) =
-                (name.to_string(), self.ranges.iter().map(|range| range.name.clone()).collect::<Vec<_>>());
-            return Err(if known.is_empty() {
-                CommandError::NoCommands { name }
-            } else {
-                CommandError::Unknown { name, known }
-            });
-        };
+        let index = self.index(name)?;
         let range = &self.ranges[index];
         let value = range.fit(value).ok_or_else(|| CommandError::OutOfRange { range: range.clone(), value })?;
+        self.put(index, value);
+        Ok(())
+    }
+
+    /// Sets a number by its name to the value of its range that is nearest to this one: a larger speed than the largest is the
+    /// largest. Returns the value that was set. Use it for sticks and navigation, which ask for what the character
+    /// may not be able to do.
+    ///
+    /// # Errors
+    /// If the task has no number of this name, or the value is not a number. The command does not change then.
+    pub fn set_clamped(&mut self, name: &str, value: f64) -> Result<f64, CommandError> {
+        let index = self.index(name)?;
+        let range = &self.ranges[index];
+        if value.is_nan() {
+            return Err(CommandError::OutOfRange { range: range.clone(), value });
+        }
+        let value = value.max(range.low).min(range.high);
+        self.put(index, value);
+        Ok(value)
+    }
+
+    /// Place of a number in the ranges.
+    fn index(&self, name: &str) -> Result<usize, CommandError> {
+        self.ranges.iter().position(|range| range.name == name).ok_or_else(|| {
+            let known: Vec<String> = self.ranges.iter().map(|range| range.name.clone()).collect();
+            let name = name.to_string();
+            if known.is_empty() { CommandError::NoCommands { name } } else { CommandError::Unknown { name, known } }
+        })
+    }
+
+    fn put(&mut self, index: usize, value: f64) {
         // reflection can set any number of values
         if self.values.as_ref().is_none_or(|values| values.len() != self.ranges.len()) {
             self.rest();
         }
         self.values.iter_mut().for_each(|values| values[index] = value);
-        Ok(())
     }
 
     /// Sets every number to its rest: 0, or the end of the range that is nearest to 0. Most characters then stand.
@@ -136,6 +158,23 @@ mod tests {
         assert_eq!(command.values(), None);
         let none = AgentCommand::default().set("speed", 1.0);
         assert!(none.is_err_and(|error| error.to_string().contains("takes no commands")));
+    }
+
+    #[test]
+    fn a_clamped_number_is_the_nearest_of_its_range() -> Result<(), CommandError> {
+        let mut command = command();
+        for (value, expected) in [(4.0, 3.0), (-2.0, -1.0), (f64::INFINITY, 3.0), (0.5, 0.5)] {
+            assert_eq!(command.set_clamped("speed", value)?, expected);
+            assert_eq!(command.values(), Some(&[expected, 0.5][..]));
+        }
+        for (name, value, expected) in [
+            ("sped", 1.0, "no command 'sped'; did you mean 'speed'? known: speed, height"),
+            ("speed", f64::NAN, "command 'speed' is NaN, expected -1 to 3 m/s"),
+        ] {
+            assert_eq!(command.set_clamped(name, value).map_err(|error| error.to_string()), Err(expected.into()));
+        }
+        assert_eq!(command.get("speed"), Some(0.5));
+        Ok(())
     }
 
     #[test]

@@ -135,3 +135,33 @@ pub enum SnapshotError {
     #[error(transparent)]
     Env(#[from] EnvError),
 }
+
+/// An error of a limb that [`LimbStrength::set`](crate::LimbStrength::set) refuses.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum StrengthError {
+    /// The character has no actuators, or is not in the simulation yet.
+    #[error("no limb '{name}': the character has no actuators, or is not in the simulation yet")]
+    NoLimbs {
+        /// The name that was given.
+        name: String,
+    },
+    /// The character has no limb of this name.
+    #[error("no limb '{name}'{}", hint::among(name, known))]
+    Unknown {
+        /// The name that was given.
+        name: String,
+        /// The names of the character's limbs.
+        known: Vec<String>,
+    },
+    /// The factor is outside its range.
+    #[error("strength of '{name}' is {factor}, expected a factor of 0 to {strongest}")]
+    OutOfRange {
+        /// The name of the limb.
+        name: String,
+        /// The factor that was given.
+        factor: f64,
+        /// The largest factor.
+        strongest: f64,
+    },
+}

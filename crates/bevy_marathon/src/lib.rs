@@ -48,6 +48,7 @@
 //!
 //! None is a default: then nothing draws and no renderer is compiled, as a server needs it.
 
+mod actuation;
 pub mod asset;
 pub mod axes;
 mod characters;
@@ -56,27 +57,39 @@ mod direction;
 mod error;
 mod ground;
 mod levels;
+mod limbs;
 mod lod;
 #[cfg(feature = "render")]
 pub mod look;
 mod marathon;
+mod messages;
+mod mode;
+mod place;
 mod plugin;
 pub mod pose;
 mod ragdoll;
+mod reactions;
+mod report;
 mod simulate;
 mod snapshot;
+mod strength;
 
 pub use asset::{PolicyAsset, RagdollPrefab};
 pub use characters::{PoseSample, spec_of_role};
 pub use command::AgentCommand;
 pub use direction::MoveDirection;
-pub use error::{CommandError, RagdollError, SnapshotError};
+pub use error::{CommandError, RagdollError, SnapshotError, StrengthError};
 pub use ground::{Ground, TRACK_HALF_WIDTH};
 pub use lod::{Lod, LodByDistance};
 pub use marathon::{Marathon, RagdollState};
+pub use messages::*;
+pub use mode::RagdollMode;
+pub use place::CharacterPose;
 pub use plugin::{MarathonPlugin, MarathonSystems};
 pub use ragdoll::*;
+pub use reactions::HitReactions;
 pub use snapshot::{MarathonSnapshot, RagdollSnapshot};
+pub use strength::LimbStrength;
 
 /// The names that most apps need.
 pub mod prelude {
@@ -85,11 +98,13 @@ pub mod prelude {
         ErrorColors, FollowCamera, FollowCameraPlugin, Ghost, GhostPlugin, LookPlugin, Marks, MarksPlugin, Quality,
         SceneryPlugin, Skin, SkinPlugin, Tint,
     };
+    pub use crate::messages::*;
     pub use crate::plugin::{MarathonPlugin, MarathonSystems};
     pub use crate::ragdoll::*;
     pub use crate::{
-        AgentCommand, CommandError, Ground, Lod, LodByDistance, Marathon, MarathonSnapshot, MoveDirection, PolicyAsset,
-        RagdollError, RagdollPrefab, RagdollSnapshot, RagdollState, SnapshotError,
+        AgentCommand, CharacterPose, CommandError, Ground, HitReactions, LimbStrength, Lod, LodByDistance, Marathon,
+        MarathonSnapshot, MoveDirection, PolicyAsset, RagdollError, RagdollMode, RagdollPrefab, RagdollSnapshot,
+        RagdollState, SnapshotError, StrengthError,
     };
     pub use marathon_physics::Variation;
     pub use marathon_runs::TaskConfig;

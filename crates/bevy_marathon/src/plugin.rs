@@ -1,16 +1,25 @@
 //! The plugin: its systems and their order.
 
+use crate::actuation;
 use crate::asset::{MjcfLoader, PolicyAsset, PolicyLoader, RagdollPrefab};
 use crate::command::AgentCommand;
 use crate::direction::{self, MoveDirection};
 use crate::levels;
 use crate::lod::{Lod, LodByDistance};
 use crate::marathon::Marathon;
-use crate::ragdoll::{
-    CharacterPolicy, Controls, Episode, EpisodeBegan, EpisodeEnded, FootContact, Held, LaidGround, Opponent, OwnGround,
-    Part, Physique, Push, Ragdoll, Restart, RestartNow, Target, TargetReached,
+use crate::messages::{
+    EpisodeBegan, EpisodeEnded, Fell, FootContact, GotUp, HitReceived, Landed, Push, RestartNow, SkillEnded,
+    SkillStarted, TargetReached,
 };
+use crate::mode::RagdollMode;
+use crate::place::{self, CharacterPose};
+use crate::ragdoll::{
+    CharacterPolicy, Controls, Episode, Held, LaidGround, Opponent, OwnGround, Part, Physique, Ragdoll, Restart, Target,
+};
+use crate::reactions::HitReactions;
+use crate::report;
 use crate::simulate;
+use crate::strength::LimbStrength;
 use bevy::prelude::*;
 
 /// Ragdolls for any Bevy app.
@@ -30,24 +39,19 @@ pub enum MarathonSystems {
     Simulate,
     /// [`crate::Episode`]s and messages are written. Read them after this.
     Report,
-    /// In [`RunFixedMainLoop`], after the fixed loop: the transforms of all parts, at the time of the frame.
+    /// In [`RunFixedMainLoop`], after the fixed loop: the transforms of all parts and [`crate::CharacterPose`]s, at the time of the frame.
     Show,
 }
 
 impl Plugin for MarathonPlugin {
     fn build(&self, app: &mut App) {
         register_types(app);
+        add_messages(app);
         app.init_asset::<RagdollPrefab>()
             .init_asset::<PolicyAsset>()
             .init_asset_loader::<MjcfLoader>()
             .init_asset_loader::<PolicyLoader>()
             .init_resource::<Marathon>()
-            .add_message::<Push>()
-            .add_message::<RestartNow>()
-            .add_message::<FootContact>()
-            .add_message::<EpisodeEnded>()
-            .add_message::<EpisodeBegan>()
-            .add_message::<TargetReached>()
             .configure_sets(
                 FixedUpdate,
                 (MarathonSystems::Admit, MarathonSystems::Simulate, MarathonSystems::Report).chain(),
@@ -61,18 +65,34 @@ impl Plugin for MarathonPlugin {
                         direction::follow,
                         levels::by_distance,
                         simulate::take_in,
+                        actuation::take_in,
                         simulate::push,
                         levels::pack,
                     )
                         .chain()
                         .in_set(MarathonSystems::Admit),
                     simulate::simulate.in_set(MarathonSystems::Simulate),
-                    (simulate::report, simulate::face_targets).chain().in_set(MarathonSystems::Report),
+                    (report::report, simulate::face_targets).chain().in_set(MarathonSystems::Report),
                 ),
             )
-            .add_systems(RunFixedMainLoop, simulate::show.in_set(MarathonSystems::Show))
+            .add_systems(RunFixedMainLoop, (simulate::show, place::show).in_set(MarathonSystems::Show))
             .add_observer(simulate::dismiss);
     }
+}
+
+fn add_messages(app: &mut App) {
+    app.add_message::<Push>()
+        .add_message::<RestartNow>()
+        .add_message::<FootContact>()
+        .add_message::<Landed>()
+        .add_message::<Fell>()
+        .add_message::<GotUp>()
+        .add_message::<SkillStarted>()
+        .add_message::<SkillEnded>()
+        .add_message::<HitReceived>()
+        .add_message::<EpisodeEnded>()
+        .add_message::<EpisodeBegan>()
+        .add_message::<TargetReached>();
 }
 
 /// Lets inspectors and scenes read and write the components.
@@ -89,8 +109,12 @@ fn register_types(app: &mut App) {
         .register_type::<LodByDistance>()
         .register_type::<Target>()
         .register_type::<Physique>()
+        .register_type::<RagdollMode>()
+        .register_type::<LimbStrength>()
+        .register_type::<HitReactions>()
         .register_type::<Restart>()
         .register_type::<OwnGround>()
         .register_type::<Episode>()
+        .register_type::<CharacterPose>()
         .register_type::<Part>();
 }

@@ -1,11 +1,11 @@
 //! Poses: the entities of a ragdoll's parts, and the transforms that a configuration `qpos` gives them.
 
-use crate::axes::place_to_game;
+use crate::axes::{place_to_game, to_game};
 use crate::ragdoll::{Anatomy, Part};
 use bevy::prelude::*;
 use marathon_physics::Model;
-use marathon_physics::model::JointType;
-use marathon_render::Scene;
+use marathon_physics::model::{Geom, GeomType, JointType};
+use marathon_render::{GeomPose, Pose, Scene};
 
 /// Transforms of the bodies of a model in a configuration, in the axes of the ragdoll. `None` if a number is not finite.
 pub fn places(model: &Model, qpos: &[f64]) -> Option<Vec<Transform>> {
@@ -52,6 +52,101 @@ pub fn own_velocity(model: &Model, from: &[f64], to: &[f64], seconds: f64) -> Op
     let way = [0, 1].map(|i| (to[free.qpos_adr + i] - from[free.qpos_adr + i]) / seconds);
     let (sin, cos) = heading(model, to).sin_cos();
     Some([way[0] * cos + way[1] * sin, way[1] * cos - way[0] * sin].map(|x| x as f32))
+}
+
+/// Half of the time between the two poses that give a velocity, s.
+const MOMENT: f64 = 1e-5;
+
+/// Poses just before and after a state, from which [`velocity`] has the velocity of any point. `None` if a number is not finite.
+pub fn around(model: &Model, qpos: &[f64], qvel: &[f64]) -> Option<[Pose; 2]> {
+    let pose = |seconds| Scene::pose_from_qpos(model, &advanced(model, qpos, qvel, seconds)).ok();
+    Some([pose(-MOMENT)?, pose(MOMENT)?])
+}
+
+/// Velocity of a point between the two poses of [`around`], m/s.
+pub fn velocity([before, after]: &[Pose; 2], point: impl Fn(&Pose) -> [f64; 3]) -> [f64; 3] {
+    let (a, b) = (point(before), point(after));
+    std::array::from_fn(|i| (b[i] - a[i]) / (2.0 * MOMENT))
+}
+
+/// Place and velocities of the root body, in the axes of the ragdoll.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RootMotion {
+    /// Transform.
+    pub place: Transform,
+    /// Velocity of the origin of the body, m/s.
+    pub linear: Vec3,
+    /// Angular velocity, rad/s.
+    pub angular: Vec3,
+}
+
+/// Motion of the body that the first joint moves. `None` without a joint, or if a number is not finite.
+pub fn root_motion(model: &Model, qpos: &[f64], qvel: &[f64]) -> Option<RootMotion> {
+    let joint = model.joints.first()?;
+    if let (JointType::Free, [x, y, z, a, b, c, d, ..], [u, v, w, p, q, r, ..]) = (joint.kind, qpos, qvel) {
+        let place = place_to_game([*x, *y, *z], [*a, *b, *c, *d]);
+        // the angular velocity is in the axes of the body
+        let angular = place.rotation * to_game([*p, *q, *r]);
+        return place.is_finite().then_some(RootMotion { place, linear: to_game([*u, *v, *w]), angular });
+    }
+    let around = around(model, qpos, qvel)?;
+    let linear = to_game(velocity(&around, |pose| pose.bodies[joint.body].pos));
+    let [before, after] = around.each_ref().map(|pose| pose.bodies[joint.body]);
+    // twice the vector part of the turn from one to the other; q and -q are the same orientation
+    let ([p, a, b, c], [q, x, y, z]) = (before.quat, after.quat);
+    let sign = if p * q + a * x + b * y + c * z < 0.0 { -1.0 } else { 1.0 };
+    let turn = [p * x - q * a + b * z - c * y, p * y - q * b + c * x - a * z, p * z - q * c + a * y - b * x];
+    let angular = to_game(turn.map(|x| sign * x / MOMENT));
+    let place = place_to_game(after.pos, after.quat);
+    Some(RootMotion { place, linear, angular })
+}
+
+/// A configuration after a moment at a velocity, to first order.
+fn advanced(model: &Model, qpos: &[f64], qvel: &[f64], seconds: f64) -> Vec<f64> {
+    let mut q = qpos.to_vec();
+    for joint in &model.joints {
+        let (at, dof) = (joint.qpos_adr, joint.dof_adr);
+        let (slides, turn) = match joint.kind {
+            JointType::Free => (3, Some((at + 3, dof + 3))),
+            JointType::Ball => (0, Some((at, dof))),
+            JointType::Slide | JointType::Hinge => (1, None),
+        };
+        for (q, v) in q.iter_mut().skip(at).zip(qvel.iter().skip(dof)).take(slides) {
+            *q += v * seconds;
+        }
+        let Some((at, dof)) = turn else { continue };
+        if let (Some([w, x, y, z]), Some([a, b, c])) = (q.get(at..at + 4), qvel.get(dof..dof + 3)) {
+            // the angular velocity is in the axes of the body: q' = q w / 2
+            let change = [-x * a - y * b - z * c, w * a + y * c - z * b, w * b + z * a - x * c, w * c + x * b - y * a];
+            for (q, change) in q[at..at + 4].iter_mut().zip(change) {
+                *q += 0.5 * seconds * change;
+            }
+        }
+    }
+    q
+}
+
+/// Lowest point of a geom. That of a mesh is its center.
+pub fn lowest(geom: &Geom, pose: &GeomPose) -> [f64; 3] {
+    // the vertical in the axes of the geom
+    let up = pose.mat[2];
+    let size = geom.size;
+    let flat = (up[0] * up[0] + up[1] * up[1]).sqrt().max(1e-12);
+    let end = |i: usize| if up[i] > 0.0 { -size[i] } else { size[i] };
+    let along_z = if up[2] > 0.0 { -size[1] } else { size[1] };
+    let local = match geom.kind {
+        GeomType::Sphere => up.map(|u| -size[0] * u),
+        GeomType::Capsule => [-size[0] * up[0], -size[0] * up[1], along_z - size[0] * up[2]],
+        GeomType::Cylinder => [-size[0] * up[0] / flat, -size[0] * up[1] / flat, along_z],
+        GeomType::Box => [end(0), end(1), end(2)],
+        GeomType::Ellipsoid => {
+            let scaled: [f64; 3] = std::array::from_fn(|i| size[i] * up[i]);
+            let length = scaled.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-12);
+            std::array::from_fn(|i| -size[i] * scaled[i] / length)
+        }
+        GeomType::Plane | GeomType::Hfield | GeomType::Mesh => [0.0; 3],
+    };
+    std::array::from_fn(|i| pose.pos[i] + (0..3).map(|k| pose.mat[i][k] * local[k]).sum::<f64>())
 }
 
 /// A configuration between two: coordinates linearly, quaternions along the shorter way.
@@ -106,6 +201,72 @@ mod tests {
         b[3..7].iter_mut().for_each(|x| *x = -*x);
         let q = mix(&model, &a, &b, 0.25);
         assert_eq!(q, [1.5, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+        Ok(())
+    }
+
+    #[test]
+    fn velocities_are_those_of_a_turning_body() -> Result<(), Box<dyn std::error::Error>> {
+        let xml = "<mujoco><worldbody><body><freejoint/><geom size='.1' pos='0 0.5 0'/></body></worldbody></mujoco>";
+        let model = Model::from_xml_str(xml, "ball")?;
+        // turned by a quarter about z, so that its y axis is -x of the world; it turns about its own z, which is up
+        let (half, qvel) = (0.5_f64.sqrt(), [1.0, 0.0, 2.0, 0.0, 0.0, 3.0]);
+        let qpos = [0.0, 0.0, 1.0, half, 0.0, 0.0, half];
+        let around = around(&model, &qpos, &qvel).ok_or("finite numbers")?;
+        let v = velocity(&around, |pose| pose.geoms[0].pos);
+        let expected = [1.0, -1.5, 2.0];
+        assert!(v.iter().zip(expected).all(|(v, x)| (v - x).abs() < 1e-6), "{v:?}");
+        Ok(())
+    }
+
+    #[test]
+    fn the_root_moves_as_its_joints_say() -> Result<(), Box<dyn std::error::Error>> {
+        let half = 0.5_f64.sqrt();
+        let free = "<mujoco><worldbody><body><freejoint/><geom size='.1'/></body></worldbody></mujoco>";
+        let plane = "<mujoco><worldbody><body><joint type='slide' axis='1 0 0'/><joint type='slide' axis='0 0 1'/>\
+            <joint axis='0 1 0'/><geom size='.1'/></body></worldbody></mujoco>";
+        // a quarter about z, so that the y axis of the free body is -x of the world
+        for (xml, qpos, qvel, linear, angular) in [
+            (
+                free,
+                &[1.0, 2.0, 3.0, half, 0.0, 0.0, half][..],
+                &[1.0, 0.5, 2.0, 0.0, 3.0, 0.0][..],
+                [1.0, 0.5, 2.0],
+                [-3.0, 0.0, 0.0],
+            ),
+            (plane, &[1.0, 3.0, 0.4][..], &[1.5, -0.5, 2.0][..], [1.5, 0.0, -0.5], [0.0, 2.0, 0.0]),
+        ] {
+            let model = Model::from_xml_str(xml, "root")?;
+            let root = root_motion(&model, qpos, qvel).ok_or("finite numbers")?;
+            let near = |v: Vec3, x: [f64; 3]| v.distance(to_game(x)) < 1e-4;
+            assert!(near(root.linear, linear) && near(root.angular, angular), "{root:?}");
+            let places = places(&model, qpos).ok_or("finite numbers")?;
+            assert!(root.place.translation.distance(places[1].translation) < 1e-3, "{root:?}");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn the_lowest_point_is_below_all_others() -> Result<(), Box<dyn std::error::Error>> {
+        let turn = "euler='30 50 20'";
+        let geoms = ["sphere", "capsule", "cylinder", "box", "ellipsoid"]
+            .map(|kind| format!("<geom type='{kind}' size='.1 .2 .3' {turn}/>"))
+            .concat();
+        let xml = format!("<mujoco><worldbody><body><freejoint/>{geoms}</body></worldbody></mujoco>");
+        let model = Model::from_xml_str(&xml, "shapes")?;
+        let pose = Scene::pose_from_qpos(&model, &model.qpos0)?;
+        // the size of the box around each along the vertical, by the row of the rotation that the vertical has
+        let [x, y, z] = pose.geoms[0].mat[2].map(f64::abs);
+        let expected = [
+            0.1,
+            0.1 + 0.2 * z,
+            0.1 * (x * x + y * y).sqrt() + 0.2 * z,
+            0.1 * x + 0.2 * y + 0.3 * z,
+            (0.01 * x * x + 0.04 * y * y + 0.09 * z * z).sqrt(),
+        ];
+        for ((geom, pose), depth) in model.geoms.iter().zip(&pose.geoms).zip(expected) {
+            let found = lowest(geom, pose)[2];
+            assert!((found + depth).abs() < 1e-12, "{:?}: {found} and {depth}", geom.kind);
+        }
         Ok(())
     }
 }

@@ -4,6 +4,8 @@ use crate::asset::{PolicyAsset, RagdollPrefab};
 use crate::error::RagdollError;
 use crate::ground::Ground;
 use crate::lod::Lod;
+use crate::mode::RagdollMode;
+use crate::strength::LimbStrength;
 use bevy::prelude::*;
 use bevy::reflect::reflect_remote;
 use marathon_envs::Spec;
@@ -19,7 +21,7 @@ use std::sync::Arc;
 /// ragdolls of the world.
 #[derive(Component, Clone, Debug, Reflect)]
 #[reflect(Component, Clone, Debug)]
-#[require(Transform, Episode, Restart, OwnGround, Lod)]
+#[require(Transform, Episode, Restart, OwnGround, Lod, RagdollMode, LimbStrength)]
 pub struct Ragdoll {
     /// Kind of the ragdoll.
     pub character: Character,
@@ -107,7 +109,7 @@ pub struct Held(pub Vec<Option<f32>>);
 #[reflect(Component, Clone, Debug, PartialEq)]
 pub struct LaidGround(pub Vec<f32>);
 
-/// A place to run to. At the start of every episode the ragdoll is turned towards it; [`TargetReached`] tells of the
+/// A place to run to. At the start of every episode the ragdoll is turned towards it; [`TargetReached`](crate::TargetReached) tells of the
 /// arrival.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Clone, Debug, PartialEq)]
@@ -234,78 +236,3 @@ pub struct Part {
 /// A [`Ragdoll`] that cannot be simulated, and why. Added by the plugin. Remove it to try again.
 #[derive(Component, Clone, Debug)]
 pub struct Unfit(pub Arc<RagdollError>);
-
-/// Pushes a ragdoll.
-#[derive(Message, Clone, Copy, Debug, PartialEq)]
-pub struct Push {
-    /// Whom.
-    pub ragdoll: Entity,
-    /// Which body of its model.
-    pub body: usize,
-    /// Force in the world's axes, N.
-    pub force: Vec3,
-    /// Where, in the world's axes; `None`: at the body's center of mass.
-    pub at: Option<Vec3>,
-    /// How long, s; it lasts at least one decision.
-    pub seconds: f64,
-}
-
-/// Starts a new episode.
-#[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RestartNow {
-    /// Whose.
-    pub ragdoll: Entity,
-}
-
-/// A foot has touched the ground, or left it.
-#[derive(Message, Clone, Debug, PartialEq)]
-pub struct FootContact {
-    /// Whose foot.
-    pub ragdoll: Entity,
-    /// Index in [`Anatomy::feet`].
-    pub foot: usize,
-    /// Whether it has touched.
-    pub down: bool,
-}
-
-/// Why an episode ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum End {
-    /// The agent failed: it fell.
-    Fell,
-    /// The task's time was up.
-    TimeUp,
-    /// Its simulation stopped being finite.
-    Broke,
-    /// [`RestartNow`].
-    Asked,
-}
-
-/// An episode has ended: a fall, or the end of the time.
-#[derive(Message, Clone, Debug, PartialEq)]
-pub struct EpisodeEnded {
-    /// Whose.
-    pub ragdoll: Entity,
-    /// Why.
-    pub end: End,
-    /// How it went.
-    pub episode: Episode,
-}
-
-/// An episode has begun: the ragdoll has been reset.
-#[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
-pub struct EpisodeBegan {
-    /// Whose.
-    pub ragdoll: Entity,
-    /// Number of the episode.
-    pub number: u64,
-}
-
-/// A ragdoll has reached its [`Target`].
-#[derive(Message, Clone, Copy, Debug, PartialEq)]
-pub struct TargetReached {
-    /// Which ragdoll.
-    pub ragdoll: Entity,
-    /// Where it was going.
-    pub target: Target,
-}

@@ -2,22 +2,26 @@
 
 use crate::asset::{PolicyAsset, RagdollPrefab};
 use crate::axes::{to_game, to_physics};
-use crate::characters::{CharacterBatch, CharacterKind, Event, Shove, Slot, spec_of_role};
+use crate::characters::{CharacterBatch, CharacterKind, Shove, Slot, spec_of_role};
 use crate::command::AgentCommand;
 use crate::error::RagdollError;
 use crate::ground::Ground;
 use crate::lod::Lod;
 use crate::marathon::{Marathon, RagdollState};
+use crate::messages::{EpisodeBegan, Push, RestartNow, TargetReached};
+use crate::place::CharacterPose;
 use crate::pose;
 use crate::ragdoll::{
-    Anatomy, Character, CharacterPolicy, Controls, Episode, EpisodeBegan, EpisodeEnded, FootContact, Held, LaidGround,
-    Opponent, OwnGround, Part, Physique, Push, Ragdoll, Restart, RestartNow, Target, TargetReached, Unfit,
+    Anatomy, Character, CharacterPolicy, Controls, Episode, Held, LaidGround, Opponent, Part, Physique, Ragdoll,
+    Restart, Target, Unfit,
 };
+use crate::strength::LimbStrength;
 use bevy::asset::LoadState;
 use bevy::ecs::lifecycle::Remove;
 use bevy::prelude::*;
 use bevy::tasks::ComputeTaskPool;
 use marathon_learn::PolicyMeta;
+use marathon_physics::{Model, Variation};
 use marathon_render::Scene;
 use marathon_runs::{RunError, TaskConfig};
 use std::sync::Arc;
@@ -32,20 +36,25 @@ pub(crate) fn admit(
     prefabs: Res<Assets<RagdollPrefab>>,
     (policies, server): (Res<Assets<PolicyAsset>>, Res<AssetServer>),
     new: Query<
-        (Entity, &Ragdoll, &Restart, Option<&CharacterPolicy>, Option<&AgentCommand>),
+        (Entity, &Ragdoll, &Restart, &LimbStrength, Option<&CharacterPolicy>, Option<&AgentCommand>),
         (Without<RagdollState>, Without<Unfit>),
     >,
 ) {
     // the tick that begins here shows times from `now` on; its elapsed time is that of its end
     marathon.now = time.elapsed();
-    for (entity, ragdoll, restart, policy, command) in &new {
+    for (entity, ragdoll, restart, strength, policy, command) in &new {
         let meta = policy.and_then(|policy| policies.get(&policy.0)).map(|asset| asset.0.meta());
         let loads = |policy: &CharacterPolicy| matches!(server.load_state(&policy.0), LoadState::Loading);
         if ragdoll.task_config.is_none() && meta.is_none() && policy.is_some_and(loads) {
             continue;
         }
         match enter(&mut marathon, &prefabs, ragdoll, meta, *restart) {
-            Ok(Some(key)) => build(&mut commands.entity(entity), &marathon.kinds[key.kind], key, command),
+            Ok(Some(key)) => {
+                let kind = &marathon.kinds[key.kind];
+                let mut entity = commands.entity(entity);
+                entity.insert(strength.with_limbs(&kind.limbs));
+                build(&mut entity, kind, key, command);
+            }
             // a prefab that is still being loaded
             Ok(None) => {}
             Err(error) => {
@@ -112,7 +121,7 @@ fn build(entity: &mut EntityCommands, kind: &CharacterKind, key: RagdollState, c
     let parts = pose::spawn_parts(entity.commands_mut(), &kind.model, ragdoll);
     let anatomy =
         Anatomy { model: kind.model.clone(), spec: kind.spec.clone(), parts, feet: kind.feet.clone(), dt: kind.dt };
-    entity.insert((key, anatomy));
+    entity.insert((key, anatomy, CharacterPose::default()));
     let ranges = kind.spec.as_ref().map_or(&[][..], |spec| &spec.command);
     // a command that was spawned with the ragdoll is kept if it is one of this task
     if !ranges.is_empty() && command.is_none_or(|command| command.ranges() != ranges) {
@@ -166,20 +175,12 @@ pub(crate) fn take_in(
         {
             error!("an AgentCommand cannot be followed: {error}");
         }
-        if let Some(physique) = physique.filter(|p| woken || p.is_changed()) {
-            let (v, model) = (&physique.0, &anatomy.model);
-            if v.mass.len() == model.bodies.len() && v.strength.len() == model.nu {
-                batch.vary(key.lane, v);
-            } else {
-                let (masses, strengths) = (v.mass.len(), v.strength.len());
-                error!(
-                    "a Physique has {masses} masses and {strengths} strengths, expected {} and {}",
-                    model.bodies.len(),
-                    model.nu
-                );
-            }
-        }
         let Some(slot) = &mut batch.lanes[key.lane] else { continue };
+        if let Some(physique) = physique.filter(|p| woken || p.is_changed())
+            && fits_model(&physique.0, &anatomy.model)
+        {
+            (slot.physique, slot.physique_changed) = (Some(physique.0.clone()), true);
+        }
         slot.restart = *restart;
         slot.controls = controls.cloned();
         slot.held = held.cloned();
@@ -219,6 +220,21 @@ fn fits(policy: &marathon_learn::Policy, anatomy: &Anatomy, role: usize) -> bool
     }
 }
 
+/// Whether a ragdoll of a model can have these constants.
+fn fits_model(v: &Variation, model: &Model) -> bool {
+    let (masses, strengths) = (v.mass.len(), v.strength.len());
+    if masses != model.bodies.len() || strengths != model.nu {
+        let (bodies, motors) = (model.bodies.len(), model.nu);
+        error!("a Physique has {masses} masses and {strengths} strengths, expected {bodies} and {motors}");
+        return false;
+    }
+    if let Some((name, found, expected)) = v.out_of_range() {
+        error!("a Physique has a {name} of {found}, expected {expected}");
+        return false;
+    }
+    true
+}
+
 /// Takes in pushes and restarts.
 pub(crate) fn push(
     mut marathon: ResMut<Marathon>,
@@ -243,8 +259,10 @@ pub(crate) fn push(
             None => [0.0; 3],
         };
         let decisions = (push.seconds / anatomy.dt).round().max(1.0) as u64;
+        let impulse = force.map(|x| x * decisions as f64 * anatomy.dt);
+        let limbs = marathon.kinds[key.kind].limbs.clone();
         if let Some(slot) = marathon.slot_mut(*key).filter(|slot| slot.asleep.is_none()) {
-            slot.push(Shove { body: push.body, force, torque, decisions });
+            slot.push(Shove { body: push.body, force, torque, decisions, impulse }, &limbs, anatomy.dt);
         }
     }
     for restart in restarts.read() {
@@ -292,38 +310,6 @@ pub(crate) fn simulate(mut marathon: ResMut<Marathon>, time: Res<Time<Fixed>>) {
     });
     marathon.decisions += decisions;
     marathon.spent += began.elapsed();
-}
-
-/// Tells the world what has happened.
-pub(crate) fn report(
-    mut marathon: ResMut<Marathon>,
-    mut ragdolls: Query<(Entity, &RagdollState, &mut Episode, &mut OwnGround)>,
-    mut contacts: MessageWriter<FootContact>,
-    mut ended: MessageWriter<EpisodeEnded>,
-    mut began: MessageWriter<EpisodeBegan>,
-) {
-    for (ragdoll, key, mut episode, mut ground) in &mut ragdolls {
-        let Some(slot) = marathon.slot_mut(*key) else { continue };
-        for event in slot.events.drain(..) {
-            match event {
-                Event::Foot { foot, down } => {
-                    contacts.write(FootContact { ragdoll, foot, down });
-                }
-                Event::Ended(end, episode) => {
-                    ended.write(EpisodeEnded { ragdoll, end, episode });
-                }
-                Event::Began(number) => {
-                    began.write(EpisodeBegan { ragdoll, number });
-                }
-            }
-        }
-        if *episode != slot.episode {
-            episode.clone_from(&slot.episode);
-        }
-        if !Arc::ptr_eq(&ground.0, &slot.grounds) {
-            ground.0 = slot.grounds.clone();
-        }
-    }
 }
 
 /// Turns ragdolls towards their targets as they begin, and tells who has arrived.

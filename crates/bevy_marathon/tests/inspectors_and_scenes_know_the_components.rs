@@ -29,8 +29,12 @@ fn every_component_that_an_app_spawns_is_registered() {
         LaidGround::type_path(),
         Target::type_path(),
         Physique::type_path(),
+        RagdollMode::type_path(),
+        LimbStrength::type_path(),
+        HitReactions::type_path(),
         Restart::type_path(),
         Episode::type_path(),
+        CharacterPose::type_path(),
         OwnGround::type_path(),
         Part::type_path(),
     ] {

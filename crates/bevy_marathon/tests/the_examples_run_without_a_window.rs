@@ -7,6 +7,9 @@ mod crowd;
 #[allow(dead_code, reason = "its command line is left out")]
 #[path = "../examples/headless_server.rs"]
 mod headless_server;
+#[allow(dead_code, reason = "its window stays closed")]
+#[path = "../examples/hit_reactions.rs"]
+mod hit_reactions;
 #[path = "../examples/own_character.rs"]
 mod own_character;
 #[allow(dead_code, reason = "its window stays closed")]
@@ -20,6 +23,7 @@ mod rollback;
 mod wear_a_skin;
 
 use bevy::app::Plugins;
+use bevy::ecs::message::MessageCursor;
 use bevy::log::LogPlugin;
 use bevy::prelude::*;
 use bevy::render::RenderPlugin;
@@ -64,6 +68,25 @@ fn the_humanoid_runs() {
         world.query::<&Episode>().iter(world).any(|episode| episode.farthest > 1.0)
     });
     assert_eq!(app.world_mut().query::<&FollowCamera>().iter(app.world()).count(), 1);
+}
+
+#[test]
+fn the_fighter_takes_blows_falls_and_gets_up() {
+    let mut app = windowless(hit_reactions::sparring);
+    let (mut hits, mut falls, mut rises) = (0, 0, 0);
+    let mut cursors = (MessageCursor::default(), MessageCursor::default(), MessageCursor::default());
+    for _ in 0..3000 {
+        app.update();
+        hits += cursors.0.read(app.world().resource::<Messages<HitReceived>>()).count();
+        falls += cursors.1.read(app.world().resource::<Messages<Fell>>()).count();
+        rises += cursors.2.read(app.world().resource::<Messages<GotUp>>()).count();
+        std::thread::sleep(Duration::from_millis(1));
+        if hits > 4 && rises > 0 {
+            break;
+        }
+    }
+    // the hardest blow throws it over
+    assert!(hits > 4 && falls > 0 && rises > 0, "{hits} blows, {falls} falls, {rises} times up");
 }
 
 #[test]

@@ -1,12 +1,15 @@
 //! Sixteen lanes that are stepped together by the physics and the task.
 
+use super::detector::{Decided, Detector};
 use super::{CharacterKind, Event, PoseSample, Slot};
 use crate::error::RagdollError;
+use crate::limbs::Limbs;
+use crate::messages::End;
 use crate::pose;
-use crate::ragdoll::{Character, Controls, End, Held, Restart};
+use crate::ragdoll::{Character, Controls, Held, Restart};
 use bevy::platform::cell::SyncCell;
 use bevy::prelude::*;
-use marathon_envs::{Autoreset, BLOCK, Role, Step, VecEnv, VecEnvOptions};
+use marathon_envs::{AgentState, Autoreset, BLOCK, Role, Step, VecEnv, VecEnvOptions};
 use marathon_learn::{BlockPolicy, Policy};
 use marathon_physics::lanes::Isa;
 use marathon_physics::{Batch, BatchOptions, Model, Variation};
@@ -26,8 +29,10 @@ pub(crate) struct CharacterBatch {
     pub(super) engine: SyncCell<Engine>,
     pub lanes: Vec<Option<Slot>>,
     pub(super) model: Arc<Model>,
+    pub(super) limbs: Arc<Limbs>,
+    detector: Detector,
     pub(super) n_act: usize,
-    dt: f64,
+    pub(super) dt: f64,
     roles: Vec<Role>,
     pub(super) obs: Vec<f32>,
     pub(super) action: Vec<f32>,
@@ -36,6 +41,8 @@ pub(crate) struct CharacterBatch {
     /// Buffers for a role's observations and actions.
     seen: Vec<f32>,
     scratch: Vec<f32>,
+    /// Buffer for the factors of a ragdoll's strength.
+    pub(super) factors: Vec<f64>,
     /// The policies of the lanes, each with the number of its role.
     policies: Vec<(usize, BlockPolicy<Arc<Policy>>)>,
     out: Step,
@@ -63,6 +70,8 @@ impl CharacterBatch {
             engine: SyncCell::new(engine),
             lanes: (0..BLOCK).map(|_| None).collect(),
             model: kind.model.clone(),
+            limbs: kind.limbs.clone(),
+            detector: Detector::new(&kind.model, kind.spec.as_deref(), &kind.feet, kind.dt),
             n_act: kind.model.nu,
             dt: kind.dt,
             obs: vec![0.0; n_obs * BLOCK],
@@ -71,6 +80,7 @@ impl CharacterBatch {
             roles: kind.spec.as_ref().map(|spec| spec.deciders()).unwrap_or_default(),
             seen: Vec::new(),
             scratch: vec![0.0; kind.model.nu * BLOCK],
+            factors: vec![1.0; kind.model.nu],
             policies: Vec::new(),
             out,
         })
@@ -83,6 +93,8 @@ impl CharacterBatch {
 
     /// Gives a ragdoll a lane that is free.
     pub(super) fn admit(&mut self, lane: usize, mut slot: Slot, time: Duration) {
+        // a free lane has the strength of the model
+        slot.factors = vec![1.0; self.n_act];
         if let Engine::Env(env) = self.engine.get() {
             // the lane exists, and so does its agent
             let _ = env.reseed_agent(lane, slot.seed, slot.number as usize);
@@ -107,14 +119,6 @@ impl CharacterBatch {
             let _ = env.set_command(lane, None);
         }
         self.reset(lane);
-    }
-
-    /// Gives a ragdoll constants of its own.
-    pub fn vary(&mut self, lane: usize, variation: &Variation) {
-        match self.engine.get() {
-            Engine::Env(env) => drop(env.vary(lane, variation)),
-            Engine::Free(batch, _) => batch.vary(lane, variation),
-        }
     }
 
     /// Sets the command of a ragdoll, or gives it back to its own schedule. A body without a task takes no command.
@@ -147,7 +151,7 @@ impl CharacterBatch {
     pub fn put(&mut self, lane: usize, qpos: &[f64], qvel: &[f64], time: Duration) {
         match self.engine.get() {
             Engine::Env(env) => {
-                let state = marathon_envs::AgentState { qpos: qpos.to_vec(), qvel: qvel.to_vec() };
+                let state = AgentState { qpos: qpos.to_vec(), qvel: qvel.to_vec() };
                 if env.set_state(lane, &state).is_ok() {
                     let mask: [bool; BLOCK] = std::array::from_fn(|i| i == lane);
                     let _ = env.observe(&mask, &mut self.obs);
@@ -208,6 +212,7 @@ impl CharacterBatch {
     /// Makes one decision for all sixteen; `time` is that of the state it leads to.
     pub fn decide(&mut self, time: Duration) {
         self.choose();
+        self.strengthen();
         self.shove();
         match self.engine.get() {
             Engine::Env(env) => {
@@ -289,7 +294,7 @@ impl CharacterBatch {
                     *a = x.filter(|x| x.is_finite()).unwrap_or(*a);
                 }
             }
-            if slot.lying.is_some() {
+            if slot.is_limp() {
                 row.fill(0.0);
             }
             slot.episode.action.clear();
@@ -327,6 +332,33 @@ impl CharacterBatch {
         }
     }
 
+    /// Finds the events of a decision after which these feet are on the ground.
+    fn detect(&mut self, lane: usize, feet: u32, failed: bool) {
+        let engine = self.engine.get();
+        let Some(slot) = &mut self.lanes[lane] else { return };
+        let acts = !slot.is_limp();
+        let Some(before) = slot.history.back() else { return };
+        let after = || match &engine {
+            Engine::Env(env) => env.state(lane).unwrap_or_else(|_| AgentState { qpos: Vec::new(), qvel: Vec::new() }),
+            Engine::Free(batch, _) => AgentState { qpos: batch.qpos(lane), qvel: batch.qvel(lane) },
+        };
+        let n = self.out.info.len() / BLOCK;
+        let gravity = slot.physique.as_ref().map_or(self.model.opt.gravity, |own| own.gravity);
+        let decided = Decided {
+            before: [&before.qpos, &before.qvel],
+            after: &after,
+            feet: [slot.episode.feet, feet],
+            info: &self.out.info[lane * n..(lane + 1) * n],
+            command: &slot.episode.command,
+            gravity: gravity[2],
+            acts,
+            first: slot.episode.decisions == 0 || slot.revived,
+            failed,
+        };
+        self.detector.detect(&mut slot.progress, &decided, &mut slot.events);
+        slot.revived = false;
+    }
+
     /// Takes in what a decision led to. Returns whether a new episode begins.
     fn judge(&mut self, lane: usize) -> bool {
         let agent = matches!(self.engine.get(), Engine::Env(_));
@@ -334,29 +366,29 @@ impl CharacterBatch {
             Engine::Env(env) => env.feet(lane).unwrap_or_default(),
             Engine::Free(..) => 0,
         };
-        let out = &self.out;
         let (terminated, truncated, diverged) = match agent {
-            true => (out.terminated[lane], out.truncated[lane], out.diverged[lane]),
+            true => (self.out.terminated[lane], self.out.truncated[lane], self.out.diverged[lane]),
             false => (false, false, false),
         };
+        if !diverged {
+            self.detect(lane, feet, terminated);
+        }
+        let out = &self.out;
         let Some(slot) = &mut self.lanes[lane] else { return terminated || truncated || diverged };
         let asked = slot.begin_now;
-        let episode = &mut slot.episode;
-        for foot in 0..32 {
-            if (episode.feet ^ feet) >> foot & 1 == 1 {
-                slot.events.push(Event::Foot { foot, down: feet >> foot & 1 == 1 });
-            }
-        }
-        episode.feet = feet;
+        slot.episode.feet = feet;
         if let Some(rest) = &mut slot.lying {
             *rest = rest.saturating_sub(1);
-            let up = *rest == 0 || diverged || asked;
+        }
+        if slot.is_limp() {
+            let up = slot.lying == Some(0) || diverged || asked;
             if up {
                 slot.begin();
             }
             return up;
         }
         let Restart { after_fall, on_time_up } = slot.restart;
+        let episode = &mut slot.episode;
         episode.untimed |= !on_time_up;
         episode.decisions += 1;
         episode.seconds = episode.decisions as f64 * self.dt;

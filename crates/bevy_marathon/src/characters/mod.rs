@@ -10,12 +10,20 @@ mod slot;
 
 pub(crate) use batch::CharacterBatch;
 pub(crate) use saved::{KindIdentity, LaneState};
+mod detector;
+mod event;
+mod power;
+mod slot;
+
+pub(crate) use batch::CharacterBatch;
+pub(crate) use event::Event;
 pub use slot::PoseSample;
-pub(crate) use slot::{Event, Shove, Slot};
+pub(crate) use slot::{Shove, Slot};
 
 use crate::asset::RagdollPrefab;
 use crate::error::RagdollError;
 use crate::ground::Ground;
+use crate::limbs::Limbs;
 use crate::ragdoll::Character;
 use bevy::prelude::*;
 use marathon_envs::Spec;
@@ -44,6 +52,7 @@ pub(crate) struct CharacterKind {
     pub model: Arc<Model>,
     pub spec: Option<Arc<Spec>>,
     pub feet: Vec<Arc<str>>,
+    pub limbs: Arc<Limbs>,
     /// Physics steps per decision.
     substeps: usize,
     pub dt: f64,
@@ -70,12 +79,15 @@ impl CharacterKind {
     ) -> Result<Self, RagdollError> {
         let agent = ground.agent_with(&task_config.agent, &task_config.options)?;
         let spec = agent.clone().shards(Isa::best())?.spec().clone();
+        let model = Arc::new(agent.model()?);
+        let feet: Vec<Arc<str>> = agent.facts().feet.iter().map(|n| Arc::from(n.as_str())).collect();
         Ok(CharacterKind {
             character: Character::Agent(name.into()),
             task_config: task_config.clone(),
             ground,
-            model: Arc::new(agent.model()?),
-            feet: agent.facts().feet.iter().map(|n| Arc::from(n.as_str())).collect(),
+            limbs: Arc::new(Limbs::of(&model, &feet)),
+            model,
+            feet,
             substeps: spec.frame_skip,
             dt: spec.dt,
             period: Duration::from_secs_f64(spec.dt),
@@ -96,6 +108,7 @@ impl CharacterKind {
             character: Character::Prefab(prefab.clone()),
             task_config: TaskConfig::default(),
             ground: Ground::Level,
+            limbs: Arc::new(Limbs::of(&model, &[])),
             model,
             feet: Vec::new(),
             substeps,

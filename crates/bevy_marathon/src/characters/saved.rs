@@ -115,10 +115,10 @@ impl CharacterBatch {
 
     /// Restores a lane that is not free. Its newest state is then that of `time`.
     fn load(&mut self, lane: usize, slot: &Slot, state: &LaneState, time: Duration) -> Result<(), SnapshotError> {
-        let entered = self.lanes[lane].as_ref().ok_or(SnapshotError::Gone)?.entered;
+        let present = self.lanes[lane].clone().ok_or(SnapshotError::Gone)?;
         self.check(slot)?;
         self.load_lane(lane, state)?;
-        let mut slot = Slot { entered, ..slot.clone() };
+        let mut slot = slot.clone().with_inputs_of(present);
         slot.retime(time);
         if slot.grounds.is_empty() {
             slot.grounds = Arc::new(self.grounds(lane));

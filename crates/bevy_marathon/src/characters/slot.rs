@@ -1,10 +1,17 @@
 //! A ragdoll in its lane: its policies, its episode, and the states that frames are drawn from.
 
 use super::LaneState;
+use super::detector::Progress;
+use super::event::Event;
+use crate::limbs::Limbs;
 use crate::lod::Lod;
-use crate::ragdoll::{Controls, End, Episode, Held, Restart};
+use crate::mode::RagdollMode;
+use crate::ragdoll::{Controls, Episode, Held, Restart};
+use crate::reactions::{Blows, HitReactions};
+use crate::strength::LimbStrength;
 use bevy::prelude::*;
 use marathon_learn::Policy;
+use marathon_physics::Variation;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -40,7 +47,27 @@ pub(crate) struct Slot {
     pub history: VecDeque<PoseSample>,
     /// Events since the last report.
     pub events: Vec<Event>,
+    /// Constants of its own, and whether the physics lacks them.
+    #[serde(skip)]
+    pub physique: Option<Variation>,
+    #[serde(skip)]
+    pub physique_changed: bool,
+    #[serde(skip)]
+    pub strength: LimbStrength,
+    #[serde(skip)]
+    pub reactions: Option<HitReactions>,
+    /// The mode that its component had when the plugin last read or wrote it.
+    #[serde(skip)]
+    pub shown_mode: RagdollMode,
     pub(super) pushes: Vec<Shove>,
+    pub(super) blows: Blows,
+    /// Factors of its actuators' forces in the physics.
+    pub(super) factors: Vec<f64>,
+    pub(super) progress: Progress,
+    /// Whether the app lets it lie without strength.
+    pub(super) limp: bool,
+    /// Whether it has its strength again since the last decision.
+    pub(super) revived: bool,
     /// Decisions for which it still lies without action; `None` if it is up.
     pub(super) lying: Option<u64>,
     pub(super) begin_now: bool,
@@ -76,14 +103,8 @@ pub(crate) struct Shove {
     pub torque: [f64; 3],
     /// Its duration in decisions.
     pub decisions: u64,
-}
-
-/// An event of a ragdoll.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) enum Event {
-    Foot { foot: usize, down: bool },
-    Ended(End, Episode),
-    Began(u64),
+    /// Impulse of all decisions, N s.
+    pub impulse: [f64; 3],
 }
 
 impl Slot {
@@ -103,15 +124,65 @@ impl Slot {
             grounds: Arc::default(),
             history: VecDeque::new(),
             events: Vec::new(),
+            physique: None,
+            physique_changed: false,
+            strength: LimbStrength::default(),
+            reactions: None,
+            shown_mode: RagdollMode::default(),
             pushes: Vec::new(),
+            blows: Blows::default(),
+            factors: Vec::new(),
+            progress: Progress::default(),
+            limp: false,
+            revived: false,
             lying: None,
             begin_now: false,
         }
     }
 
+    /// The same with the inputs of the ragdoll as it is now, which its components set.
+    pub fn with_inputs_of(mut self, present: Slot) -> Self {
+        self.entered = present.entered;
+        (self.physique, self.physique_changed) = (present.physique, true);
+        (self.strength, self.reactions) = (present.strength, present.reactions);
+        self.shown_mode = present.shown_mode;
+        self
+    }
+
     /// Pushes it at the coming decisions.
-    pub fn push(&mut self, shove: Shove) {
+    pub fn push(&mut self, shove: Shove, limbs: &Limbs, dt: f64) {
+        let Shove { body, impulse, decisions, .. } = shove;
+        let strength = impulse.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let stands = self.mode() == RagdollMode::Powered && self.episode.feet != 0;
+        let blow = (body, strength, decisions);
+        if self.blows.strike(blow, self.reactions.as_ref(), limbs, (stands, dt)) {
+            self.events.push(Event::Hit { body, impulse });
+        }
         self.pushes.push(shove);
+    }
+
+    /// Use that it makes of its actuators.
+    pub fn mode(&self) -> RagdollMode {
+        match () {
+            () if self.is_limp() => RagdollMode::Limp,
+            () if self.progress.rising => RagdollMode::GettingUp,
+            () => RagdollMode::Powered,
+        }
+    }
+
+    /// Whether it has no strength.
+    pub(super) fn is_limp(&self) -> bool {
+        self.limp || self.lying.is_some()
+    }
+
+    /// Factors of the forces of its actuators.
+    pub(super) fn wanted_factors(&self, limbs: &Limbs, dt: f64, out: &mut [f64]) {
+        for (actuator, factor) in out.iter_mut().enumerate() {
+            *factor = if self.is_limp() { 0.0 } else { self.strength.factor(actuator) };
+            if let Some(reactions) = self.reactions.as_ref().filter(|_| !self.blows.is_empty()) {
+                *factor *= self.blows.factor(actuator, reactions, limbs, dt);
+            }
+        }
     }
 
     /// Ends its episode at the next decision.
@@ -153,8 +224,10 @@ impl Slot {
     pub(super) fn begin(&mut self) {
         self.episode = Episode { number: self.episode.number + 1, ..default() };
         self.lying = None;
-        self.begin_now = false;
+        (self.limp, self.revived, self.begin_now) = (false, false, false);
         self.pushes.clear();
+        self.blows.clear();
+        std::mem::take(&mut self.progress).turn_to(None, &mut self.events);
         self.events.push(Event::Began(self.episode.number));
     }
 }

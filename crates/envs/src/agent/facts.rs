@@ -34,7 +34,8 @@ pub struct Facts {
     pub controls: Controls,
     /// Names of the reward's terms, in the order in which `step_reward` adds them.
     pub reward_terms: Vec<String>,
-    /// Names of the numbers of [`Agent::info`](crate::Agent::info).
+    /// Names of the numbers of [`Agent::info`](crate::Agent::info). Two names have a meaning for tools:
+    /// [`rising`](crate::Spec::rising) and [`skill`](crate::Spec::skill).
     pub info: Vec<String>,
     /// Numbers per decision that measure success: names of `info`, and `forward`, the distance along +x in the
     /// decision, m. Training reports may show their means.

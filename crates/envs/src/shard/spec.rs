@@ -136,6 +136,22 @@ impl Spec {
         self.metrics.iter().filter(|metric| metric.source != MetricSource::Forward)
     }
 
+    /// Index of the info `rising`: 1 while the character gets up after a fall, otherwise 0. `None` for tasks in which a
+    /// fall ends the episode, or that do not notice falls.
+    pub fn rising(&self) -> Option<usize> {
+        self.info_named("rising")
+    }
+
+    /// Index of the info `skill`: the number of the active skill, or 0. Skills are counted from 1, first the buttons of
+    /// the command in their order ([`CommandRange::is_button`]), then others.
+    pub fn skill(&self) -> Option<usize> {
+        self.info_named("skill")
+    }
+
+    fn info_named(&self, name: &str) -> Option<usize> {
+        self.info.iter().position(|info| info == name)
+    }
+
     /// Bounds of an actuator's actions for a policy with bounded actions. They are [-1, 1] for an actuator without
     /// bounds.
     #[inline(always)]

@@ -36,12 +36,12 @@ pub use portable::F32x4;
 #[cfg(target_arch = "x86_64")]
 pub use x86::{F32x8, F32x16};
 
-#[cfg(vectors = "neon")]
-use {neon as fused, neon as vector};
 #[cfg(vectors = "sse2")]
 use {emulated as fused, sse2 as vector};
 #[cfg(vectors = "simd128")]
 use {emulated as fused, wasm as vector};
+#[cfg(vectors = "neon")]
+use {neon as fused, neon as vector};
 #[cfg(vectors = "relaxed")]
 use {wasm as fused, wasm as vector};
 

@@ -14,9 +14,6 @@ use std::f64::consts::{PI, TAU};
 /// Metric of a task with the error of the velocity.
 const ERROR: &str = "velocity_error";
 
-/// Metric of a task for a character that gets up after a fall.
-const RISING: &str = "rising";
-
 /// Motion of an agent in a decision.
 pub struct Moment {
     /// Position of the center of mass along the ground, m.
@@ -88,8 +85,8 @@ impl<'a> Trial<'a> {
             ..VecEnvOptions::default()
         };
         let play = Play::of(task_config, &[policy], &vec_options)?;
-        let number = |of: &str| play.spec().info.iter().position(|name| name == of);
-        let (error, rising) = (number(ERROR), number(RISING));
+        let error = play.spec().info.iter().position(|name| name == ERROR);
+        let rising = play.spec().rising();
         let model = registry::agent(&task_config.agent)?.model()?;
         let root = free(&model);
         let place = |agent| Ok(Some(Place::of(&model, root, &play.qpos(agent)?, 0.0)));
