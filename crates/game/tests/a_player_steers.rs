@@ -52,7 +52,10 @@ fn commands(app: &mut App) -> Vec<(f64, bool)> {
 fn stick_and_arrow_keys_steer_the_character_in_focus() {
     let mut app = game(&["--agents", "2"]);
     let pad = pad(&mut app);
-    assert_eq!(*app.world().resource::<Steering>(), Steering { on: true, buttons: false, by_camera: false });
+    assert_eq!(
+        *app.world().resource::<Steering>(),
+        Steering { on: true, buttons: false, by_camera: false, flying: false }
+    );
     let own = commands(&mut app);
     assert!(own.iter().all(|(x, mine)| x.abs() <= 2.0 && !mine) && own[0] != own[1], "{own:?}");
     // beyond the dead zone of 0.12 it begins at 0, and its end is the range's
@@ -256,10 +259,10 @@ fn camera(app: &mut App) -> (Mut<'_, FollowCamera>, Transform) {
 fn the_stick_points_into_the_picture() {
     let mut app = game_of("MarathonManController", &["--seed", "3"]);
     let pad = pad(&mut app);
-    let steering = Steering { on: true, buttons: true, by_camera: true };
+    let steering = Steering { on: true, buttons: true, by_camera: true, flying: false };
     assert_eq!((*app.world().resource::<Steering>(), camera(&mut app).0.mode), (steering, CameraMode::Chase));
     // it stands where it is put
-    camera(&mut app).0.mode = CameraMode::Free;
+    camera(&mut app).0.mode = CameraMode::Held;
     for (x, y) in [(0.0, 0.6), (0.6, 0.0), (0.0, -0.6), (-0.6, 0.0), (0.45, 0.45)] {
         push(&mut app, pad, GamepadAxis::LeftStickX, x);
         push(&mut app, pad, GamepadAxis::LeftStickY, y);
@@ -307,6 +310,15 @@ fn shift_runs_and_letters_walk() {
     assert_eq!(app.world().resource::<Time<Virtual>>().relative_speed(), 1.0);
 }
 
+/// Half of the camera's vertical field of view, rad.
+fn lens(app: &mut App) -> f32 {
+    let mut query = app.world_mut().query_filtered::<&Projection, With<FollowCamera>>();
+    match query.single(app.world()).expect("one camera") {
+        Projection::Perspective(lens) => 0.5 * lens.fov,
+        _ => panic!("it has a perspective"),
+    }
+}
+
 /// On a circle of five meters the character stays in the middle third of the picture, and the camera gets behind it.
 #[test]
 fn the_camera_stays_behind_who_runs_in_a_circle() {
@@ -322,9 +334,9 @@ fn the_camera_stays_behind_who_runs_in_a_circle() {
         places.push(place);
         let (_, at) = camera(&mut app);
         let seen = at.compute_affine().inverse().transform_point3(place.with_y(1.0));
-        // half of the picture's width at a distance of 1 m: 0.75 rad from top to bottom, 16 to 9
-        let half = (0.5_f32 * 0.75).tan() * 16.0 / 9.0;
-        most = most.max((seen.x / (-seen.z * half)).abs());
+        // half of the picture's height at a distance of 1 m; the picture is 16 to 9
+        let half = lens(&mut app).tan();
+        most = most.max((seen.x / (-seen.z * half * 16.0 / 9.0)).abs()).max((seen.y / (-seen.z * half)).abs());
         assert!(at.translation.y > 0.05, "above the ground");
         // his way in the last second: a step sways
         if frame > 50 * 10 {

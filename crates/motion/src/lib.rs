@@ -62,5 +62,6 @@ pub use error::MotionError;
 pub use layout::{JointKind, Layout};
 pub use peak::Peak;
 pub use retarget::{Fit, Mapping, SkeletonPoser, fit, retarget, soles};
+pub use rotation::wrap_angle;
 pub use skeleton::{Animation, Bone, Keyframe, Seam, Skeleton};
 pub use tracking::{Places, Tracking};

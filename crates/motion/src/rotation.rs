@@ -63,8 +63,8 @@ pub(crate) fn heading(q: DQuat) -> f64 {
     wrap_angle(2.0 * libm::atan2(q.z, q.w))
 }
 
-/// The equivalent angle within -pi to pi.
-pub(crate) fn wrap_angle(angle: f64) -> f64 {
+/// The equivalent angle from -pi to pi, rad.
+pub fn wrap_angle(angle: f64) -> f64 {
     let turns = libm::round(angle / std::f64::consts::TAU);
     angle - turns * std::f64::consts::TAU
 }
@@ -72,6 +72,14 @@ pub(crate) fn wrap_angle(angle: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
+
+    #[test]
+    fn angles_are_wrapped() {
+        for (angle, expected) in [(0.0, 0.0), (3.5, 3.5 - TAU), (-3.5, TAU - 3.5), (7.0, 7.0 - TAU)] {
+            assert!((wrap_angle(angle) - expected).abs() < 1e-12, "{angle}");
+        }
+    }
 
     #[test]
     fn the_logarithm_undoes_the_exponential() {

@@ -81,6 +81,19 @@ impl SkeletonPoser {
         self.scale
     }
 
+    /// The skeleton.
+    pub fn skeleton(&self) -> &Skeleton {
+        &self.skeleton
+    }
+
+    /// The body whose rotation a bone follows; `None` for bones that follow other bones.
+    pub fn body_of(&self, bone: usize) -> Option<usize> {
+        match self.follows.get(bone)? {
+            Follows::Body(body, _) => Some(*body),
+            Follows::Between(..) | Follows::Parent => None,
+        }
+    }
+
     /// The pose of the skeleton, with its lengths times [`SkeletonPoser::scale`], for these poses of the model's
     /// bodies: position, m, and orientation, `[w, x, y, z]`. The skeleton's hips coincide with the model's, except for
     /// a height offset if its legs are shorter or longer.
