@@ -128,10 +128,10 @@ fn on_ground(ground: Ground, laid: Option<Vec<f32>>, height: impl Fn(f32) -> f32
     let (mut far, mut lowest, mut places) = (0.0_f32, f32::INFINITY, 0_usize);
     play(spawn, act, |_, _, at, distance| {
         // beside the narrow tracks there is no ground
-        if ground == Ground::Track && at.z.abs() > bevy_marathon::TRACK_HALF_WIDTH as f32 {
+        let over = at.y - height(at.x);
+        if ground == Ground::Track && (at.z.abs() > bevy_marathon::TRACK_HALF_WIDTH as f32 || over.is_infinite()) {
             return;
         }
-        let over = at.y - height(at.x);
         (far, lowest, places) = (far.max(distance), lowest.min(over), places + 1);
         assert!(over > 0.1, "{ground:?}: {over} m over the ground at {at}");
     });
@@ -165,9 +165,11 @@ fn it_is_above_a_course() -> Result<(), Box<dyn std::error::Error>> {
     let elevations = laid.clone();
     on_ground(Ground::Track, Some(laid), move |x| {
         // the first point is at -6 m, and the next ones 10 cm apart; the two rows are alike
-        let at = ((x + 6.0) / 0.1).max(0.0);
-        let columns = elevations.len() / 2;
-        let point = |i: f32| elevations[(i as usize).min(columns - 1)];
+        let (at, columns) = ((x + 6.0) / 0.1, elevations.len() / 2);
+        if !(0.0..=(columns - 1) as f32).contains(&at) {
+            return f32::NEG_INFINITY;
+        }
+        let point = |i: f32| elevations[i as usize];
         point(at.floor()) + (at - at.floor()) * (point(at.ceil()) - point(at.floor()))
     });
     Ok(())

@@ -165,6 +165,7 @@ impl FollowCamera {
             self.mode = CameraMode::Held;
         }
         self.motion.wait();
+        self.align = false;
         let [lowest, highest] = self.mode.pitch();
         self.goal[0] += yaw;
         self.goal[1] = (self.goal[1] + pitch).clamp(lowest, highest);
