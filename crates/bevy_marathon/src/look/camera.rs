@@ -12,7 +12,7 @@ use std::f32::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 /// Radians per second of [`CameraMode::Orbit`].
 const ORBIT_SPEED: f32 = 0.25;
 /// Lowest and highest angle above the ground, rad: -10 and 60 degrees.
-const PITCH: [f32; 2] = [-0.1745, 1.0472];
+const PITCH: [f32; 2] = [-0.1745, FRAC_PI_3];
 /// The same for [`CameraMode::Free`].
 const FREE_PITCH: f32 = 1.5;
 /// Closest and farthest [`FollowCamera::zoom`], m.

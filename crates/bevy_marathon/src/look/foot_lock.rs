@@ -21,7 +21,9 @@ const REACH: f64 = 0.2;
 /// Speed from which on a foot truly slides, m/s.
 const SLIDE: f64 = 0.8;
 /// Bend of the knee that is left at full stretch, as length of the leg, m.
-const BENT: f64 = 0.015;
+const BENT: f64 = 0.005;
+/// Largest way down of the skin for a foot that is out of reach, m, and its half-life, s.
+const SINK: [f64; 2] = [0.03, 0.15];
 /// Largest change of the knee's angle by the lock, rad/s: 2.5 degrees in a frame of 1/60 s.
 const KNEE_RATE: f64 = 2.6;
 /// Way of a foot in one frame after which it begins anew, m.
@@ -68,6 +70,8 @@ pub(crate) struct Legs {
     legs: Vec<Leg>,
     root: usize,
     episode: u64,
+    /// How far the skin is below the bodies, m.
+    sunk: f64,
 }
 
 /// A leg of two bones and a foot.
@@ -121,7 +125,7 @@ impl Legs {
                 None => legs.extend(Leg::of(model, poser, foot, 1 << bit)),
             }
         }
-        Legs { legs, root: model.joints.first().map_or(1, |joint| joint.body), episode: 0 }
+        Legs { legs, root: model.joints.first().map_or(1, |joint| joint.body), episode: 0, sunk: 0.0 }
     }
 
     /// Bends the legs of a pose so that feet in contact stay where they are on the screen.
@@ -136,9 +140,16 @@ impl Legs {
         let powered = stance.episode.is_some_and(|episode| !episode.down);
         let feet = stance.episode.map_or(0, |episode| episode.feet);
         let bones = Bones::of(poser, frame);
+        let mut lacks = 0.0_f64;
         for leg in &mut self.legs {
             let contact = upright && powered && feet & leg.bits != 0;
-            leg.stand(&bones, frame, poser, stance, contact);
+            lacks = lacks.max(leg.follow(&bones, stance, contact));
+        }
+        let [most, half_life] = SINK;
+        self.sunk += (lacks.min(most) - self.sunk) * (1.0 - (-LN_2 * stance.dt / half_life).exp());
+        frame.root[2] -= self.sunk;
+        for leg in &mut self.legs {
+            leg.bend(&bones, frame, poser, self.sunk, stance.dt);
         }
     }
 }
@@ -173,25 +184,34 @@ impl Leg {
         (!sole.is_empty()).then(|| Leg { bones, foot, sole, bits, state: State::default() })
     }
 
-    /// Bends the leg in a frame. `contact`: its foot carries weight, and may be locked.
-    fn stand(&mut self, bones: &Bones, frame: &mut Keyframe, poser: &SkeletonPoser, stance: &Stance, contact: bool) {
-        let Some((_, turn)) = stance.bodies.get(self.foot) else { return };
-        let ankle = bones.places[self.bones[2]];
+    /// Takes in a frame. `contact`: the foot carries weight, and may be locked. Returns what the leg lacks to reach it, m.
+    fn follow(&mut self, bones: &Bones, stance: &Stance, contact: bool) -> f64 {
+        let Some((_, turn)) = stance.bodies.get(self.foot) else { return 0.0 };
+        let [hip, knee, ankle] = self.bones.map(|bone| bones.places[bone]);
         let points: Vec<DVec3> = self.sole.iter().map(|point| ankle + quat(turn) * *point).collect();
         if stance.dt > 0.0 {
             self.state.follow(ankle, points, stance.dt, contact);
         }
+        if self.state.lock.is_none() {
+            return 0.0;
+        }
+        let most = (hip.distance(knee) + knee.distance(ankle) - 2.0 * BENT).max(hip.distance(ankle));
+        ((ankle + self.state.offset.extend(0.0) - hip).length() - most).max(0.0)
+    }
+
+    /// Bends the leg of a skin that has sunk, so that its foot is where it is to be.
+    fn bend(&mut self, bones: &Bones, frame: &mut Keyframe, poser: &SkeletonPoser, sunk: f64, dt: f64) {
         let offset = self.state.offset.extend(0.0);
-        if offset.length() < 1e-5 && self.state.opened.abs() < 1e-5 {
+        if offset.length() < 1e-5 && self.state.opened.abs() < 1e-5 && sunk < 1e-5 {
             return;
         }
-        let Some(bend) = Bend::of(bones, self.bones, &mut self.state.axis) else { return };
-        let length = bend.reach(offset, &mut self.state.opened, stance.dt);
+        let Some(bend) = Bend::of(bones, self.bones, sunk, &mut self.state.axis) else { return };
+        let length = bend.reach(offset, &mut self.state.opened, dt);
         let share = bend.share(offset, length);
         let to = match share {
-            Some(share) => bend.leg + share * offset,
+            Some(share) => bend.foot + share * offset,
             // the knee follows more slowly than the foot
-            None => (bend.leg + offset).normalize_or_zero() * length,
+            None => (bend.foot + offset).normalize_or_zero() * length,
         };
         if let Some(share) = share.filter(|share| *share < 1.0) {
             self.state.slip(share);
@@ -255,13 +275,15 @@ struct Bend {
     thigh: DVec3,
     shin: DVec3,
     leg: DVec3,
+    /// From the hip of a skin that has sunk to the ankle, m.
+    foot: DVec3,
     /// A turn of the shin about it bends the knee.
     axis: DVec3,
 }
 
 impl Bend {
     /// The triangle of three bones. None for a leg that has been straight in all frames.
-    fn of(bones: &Bones, [thigh, shin, foot]: [usize; 3], axis: &mut Option<DVec3>) -> Option<Self> {
+    fn of(bones: &Bones, [thigh, shin, foot]: [usize; 3], sunk: f64, axis: &mut Option<DVec3>) -> Option<Self> {
         let [hip, knee, ankle] = [thigh, shin, foot].map(|bone| bones.places[bone]);
         let (upper, lower) = (knee - hip, ankle - knee);
         let cross = upper.cross(lower);
@@ -269,7 +291,8 @@ impl Bend {
             *axis = Some(bones.turns[shin].conjugate() * cross.normalize());
         }
         let axis = bones.turns[shin] * (*axis)?;
-        Some(Bend { thigh: upper, shin: lower, leg: ankle - hip, axis })
+        let leg = ankle - hip;
+        Some(Bend { thigh: upper, shin: lower, leg, foot: leg + sunk * DVec3::Z, axis })
     }
 
     /// Angle inside the knee at a length of the leg, rad: pi if it is straight.
@@ -287,7 +310,7 @@ impl Bend {
     /// Length of the leg to a foot at this distance from its pose, m: softly limited towards full stretch, and in the knee's rate.
     /// `opened` is what the knee was opened by, rad.
     fn reach(&self, offset: DVec3, opened: &mut f64, dt: f64) -> f64 {
-        let (pose, wanted) = (self.leg.length(), (self.leg + offset).length());
+        let (pose, wanted) = (self.leg.length(), (self.foot + offset).length());
         let room = (self.thigh.length() + self.shin.length() - BENT - pose).max(0.0);
         let more = wanted - pose;
         let more = match more > 0.0 {
@@ -304,8 +327,8 @@ impl Bend {
 
     /// The share of a foot's offset at which the leg has a length, nearest to all of it. None if there is none from 0 to 1.
     fn share(&self, offset: DVec3, length: f64) -> Option<f64> {
-        let (a, b) = (offset.length_squared(), self.leg.dot(offset));
-        let c = self.leg.length_squared() - length * length;
+        let (a, b) = (offset.length_squared(), self.foot.dot(offset));
+        let c = self.foot.length_squared() - length * length;
         if (a + 2.0 * b + c).abs() < 1e-9 {
             return Some(1.0);
         }

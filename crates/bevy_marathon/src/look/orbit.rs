@@ -6,7 +6,7 @@ use crate::axes::to_game;
 use crate::look::obstacle::Obstacles;
 use crate::ragdoll::{Anatomy, Episode};
 use bevy::prelude::*;
-use std::f32::consts::{FRAC_PI_2, LN_2};
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, LN_2};
 
 /// Half-lives of the point that it looks at, level and upward, s. The upward one is longer: a gait's bounce must not shake it.
 const PIVOT: [f32; 2] = [0.06, 0.25];
@@ -25,7 +25,7 @@ const ABOVE_LIMITS: [f32; 2] = [0.05, 0.5];
 /// Share of a jump by which the picture does not rise.
 const JUMP_SHARE: f32 = 0.5;
 /// Largest rate at which it gets behind its target, rad/s: 45 degrees. It is that at a right angle.
-const DRIFT: f32 = 0.785;
+const DRIFT: f32 = FRAC_PI_4;
 /// Speeds between which the drift grows from nothing, m/s.
 const DRIFT_FROM: [f32; 2] = [1.0, 1.4];
 /// Seconds without a turn by the player until it drifts.
