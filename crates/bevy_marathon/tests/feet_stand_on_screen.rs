@@ -27,13 +27,16 @@ const SOLE: [[f64; 3]; 3] = [[-0.045, 0.0, -0.06], [0.165, 0.03, -0.06], [0.165,
 const SETTLED: [usize; 2] = [6, 3];
 
 /// Walk, run, walk in a circle, stop: seconds, and values of the command.
-const COURSE: [(&str, f32, [(&str, f64); 2]); 5] = [
+const COURSE: [Section; 5] = [
     ("stand", 1.0, [("speed", 0.0), ("turn", 0.0)]),
     ("walk", 8.0, [("speed", 1.4), ("turn", 0.0)]),
     ("run", 8.0, [("speed", 3.0), ("turn", 0.0)]),
     ("turn", 8.0, [("speed", 1.2), ("turn", 1.0)]),
     ("stop", 3.0, [("speed", 0.0), ("turn", 0.0)]),
 ];
+
+/// Name, seconds and values of a part of the course.
+type Section = (&'static str, f32, [(&'static str, f64); 2]);
 
 /// Bones of a leg: thigh, shin and foot.
 type LegNames = [&'static str; 3];
@@ -64,7 +67,7 @@ fn windowless() -> App {
     let plugins = DefaultPlugins.set(assets).set(window).set(render).disable::<WinitPlugin>().disable::<LogPlugin>();
     let mut app = App::new();
     app.add_plugins(plugins).add_plugins((MarathonPlugin, SkinPlugin));
-    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f32(1.0 / RATE)));
     app.finish();
     app.cleanup();
     app
@@ -105,7 +108,6 @@ fn bones(app: &App, character: Entity, names: LegNames) -> [Entity; 3] {
 fn record(app: &mut App, characters: [Entity; 2], legs: [LegNames; 2]) -> Result<[[Vec<Seen>; 2]; 2], Box<dyn Error>> {
     let found = characters.map(|character| legs.map(|names| bones(app, character, names)));
     let mut seen: [[Vec<Seen>; 2]; 2] = Default::default();
-    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f32(1.0 / RATE)));
     for (part, seconds, values) in COURSE {
         for character in characters {
             let mut command = app.world_mut().get_mut::<AgentCommand>(character).ok_or("it takes commands")?;

@@ -18,6 +18,9 @@ const FRAME: Duration = Duration::from_millis(20);
 /// Ten minutes.
 const FRAMES: usize = 600 * 50;
 const PLAYERS: u32 = 4;
+/// Half the width of hills and stairs, and thickness of a track, m.
+const FIELD: f32 = 30.0;
+const BASE: f32 = 8.0;
 
 /// A player who presses something else every now and then.
 struct Player {
@@ -127,9 +130,12 @@ fn on_ground(ground: Ground, laid: Option<Vec<f32>>, height: impl Fn(f32) -> f32
     };
     let (mut far, mut lowest, mut places) = (0.0_f32, f32::INFINITY, 0_usize);
     play(spawn, act, |_, _, at, distance| {
-        // beside the narrow tracks there is no ground
-        let over = at.y - height(at.x);
-        if ground == Ground::Track && (at.z.abs() > bevy_marathon::TRACK_HALF_WIDTH as f32 || over.is_infinite()) {
+        // beside the fields is level ground, or none: a character may run off a narrow track, and fall below its base
+        let beside = at.z.abs() > FIELD && ground != Ground::Track;
+        let over = at.y - if beside { 0.0 } else { height(at.x) };
+        if ground == Ground::Track
+            && (at.z.abs() > bevy_marathon::TRACK_HALF_WIDTH as f32 || over.is_infinite() || at.y < -BASE)
+        {
             return;
         }
         (far, lowest, places) = (far.max(distance), lowest.min(over), places + 1);
