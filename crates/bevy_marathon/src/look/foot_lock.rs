@@ -14,8 +14,10 @@ use std::f64::consts::{LN_2, PI};
 
 /// Half-life of the error of a foot in the swing, s.
 const RELEASE: f64 = 0.1;
-/// Seconds of contact until a foot is locked, and without contact until it is not: a touch of one decision is neither.
-const HOLD: [f64; 2] = [0.02, 0.02];
+/// Seconds without contact until a foot lets go, if it has risen by this height since, m: a standing foot loses contact for some
+/// decisions without rising.
+const HOLD: f64 = 0.03;
+const RISEN: f64 = 0.008;
 /// Error beyond which a foot lets go, m.
 const REACH: f64 = 0.2;
 /// Speed from which on a foot truly slides, m/s.
@@ -40,17 +42,11 @@ const STRAIGHT: f64 = 0.05;
 /// Whether the feet of a [`Skin`](crate::look::Skin) stand still on screen while they carry weight. The physics does not change.
 ///
 /// It works for legs of a thigh, a shin and a foot that each have a joint; other characters keep their pose.
-#[derive(Component, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Component, Default, Clone, Debug, PartialEq)]
 pub struct FootLock {
-    /// Whether it is on.
+    /// Whether it is on. Off by default: knees still jump by up to 5 degrees in a frame, and walking feet still slide.
     pub on: bool,
-}
-
-impl Default for FootLock {
-    fn default() -> Self {
-        FootLock { on: true }
-    }
 }
 
 /// Position, m, and orientation, `[w, x, y, z]`, of a body in MuJoCo's axes.
@@ -97,9 +93,10 @@ struct State {
     rate: DVec2,
     /// The ankle of the last frame, and its points, m. None at first.
     last: Option<(DVec3, Vec<DVec3>)>,
-    /// Seconds of contact, or without.
-    on: f64,
+    /// Seconds without contact.
     off: f64,
+    /// Height of the lowest point of the sole at the last contact, m.
+    floor: f64,
     /// What the lock opens the knee by, rad.
     opened: f64,
     /// Axis of the knee in the frame of the shin's bone.
@@ -228,13 +225,17 @@ impl State {
             *self = State { last: self.last.take(), ..State::default() };
             return;
         }
-        (self.on, self.off) = if contact { (self.on + dt, 0.0) } else { (0.0, self.off + dt) };
+        self.off = if contact { 0.0 } else { self.off + dt };
         let lowest = (0..points.len()).min_by(|a, b| points[*a].z.total_cmp(&points[*b].z)).unwrap_or(0);
+        if contact {
+            self.floor = points[lowest].z;
+        }
+        let stands = self.off < HOLD || (points[lowest].z - self.floor).abs() < RISEN;
         let velocity = |point: usize| (points[point] - old[point]).truncate() / dt;
         let slides = |point: usize| velocity(point).length() > SLIDE;
         if let Some((point, place)) = self.lock {
             let error = place - points[point].truncate();
-            let holds = self.off < HOLD[1] && error.length() < REACH && !slides(point);
+            let holds = stands && error.length() < REACH && !slides(point);
             if holds {
                 (self.offset, self.rate) = (error, -velocity(point));
                 // the foot rolls on: another point stands where it is on the screen
@@ -246,7 +247,7 @@ impl State {
             self.lock = None;
         }
         self.fade(dt);
-        if self.on >= HOLD[0] && !slides(lowest) {
+        if contact && !slides(lowest) {
             self.lock = Some((lowest, points[lowest].truncate() + self.offset));
         }
     }
@@ -321,8 +322,9 @@ impl Bend {
         let own = self.knee(pose);
         let change = self.knee(pose + more) - own;
         let most = KNEE_RATE * dt;
-        *opened += (change - *opened).clamp(-most, most);
-        self.length((own + *opened).clamp(0.1, PI))
+        let knee = (own + *opened + (change - *opened).clamp(-most, most)).clamp(0.1, PI);
+        *opened = knee - own;
+        self.length(knee)
     }
 
     /// The share of a foot's offset at which the leg has a length, nearest to all of it. None if there is none from 0 to 1.
