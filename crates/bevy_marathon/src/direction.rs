@@ -7,8 +7,8 @@ use crate::pose::heading;
 use crate::ragdoll::Anatomy;
 use bevy::prelude::*;
 use marathon_envs::CommandRange;
+use marathon_motion::wrap_angle;
 use marathon_physics::model::JointType;
-use std::f64::consts::{PI, TAU};
 use std::time::Duration;
 
 /// Turn per angle to the direction, 1/s.
@@ -57,6 +57,11 @@ impl MoveDirection {
     /// Movement in a direction, see [`MoveDirection::direction`].
     pub fn new(direction: Vec3) -> Self {
         MoveDirection { direction, aim: Aim::default() }
+    }
+
+    /// Whether it moves a character whose command has these numbers: a speed and a turn are among them.
+    pub fn moves(ranges: &[CommandRange]) -> bool {
+        Steered::of(ranges).is_some()
     }
 }
 
@@ -116,10 +121,10 @@ impl Aim {
     /// The course towards a direction: an angle along the ground, rad, and a share of the speed, 0 to 1.
     fn course(&mut self, steered: &Steered<'_>, angle: f64, pace: f64, motion: &Motion, dt: f64) -> Course {
         let [x, y] = motion.velocity;
-        let error = wrap(angle + self.shift - motion.heading);
+        let error = wrap_angle(angle + self.shift - motion.heading);
         let straight = steered.sideways().is_some() || error.abs() < DRIFT_MAX;
         if straight && x.hypot(y) > DRIFT_SPEED {
-            let drift = wrap(angle - y.atan2(x));
+            let drift = wrap_angle(angle - y.atan2(x));
             self.shift = (self.shift + DRIFT_GAIN * drift * dt).clamp(-DRIFT_MAX, DRIFT_MAX);
         }
         if let Some(left) = steered.sideways() {
@@ -141,11 +146,6 @@ impl Aim {
     }
 }
 
-/// An angle from -pi to pi.
-fn wrap(angle: f64) -> f64 {
-    (angle + PI).rem_euclid(TAU) - PI
-}
-
 /// Writes the commands of characters that move in a direction, once per decision.
 pub(crate) fn follow(
     marathon: Res<Marathon>,
@@ -161,7 +161,7 @@ pub(crate) fn follow(
         let dt = sample.time.saturating_sub(aim.seen).as_secs_f64().min(2.0 * anatomy.dt);
         let heading = heading(&anatomy.model, &sample.qpos);
         let turn = match aim.last {
-            Some(last) if dt > 0.0 && !sample.fresh => wrap(heading - last) / dt,
+            Some(last) if dt > 0.0 && !sample.fresh => wrap_angle(heading - last) / dt,
             _ => 0.0,
         };
         if sample.fresh {
@@ -199,6 +199,7 @@ pub(crate) fn follow(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::PI;
 
     const STILL: Motion = Motion { heading: 0.0, turn: 0.0, velocity: [0.0; 2] };
 
@@ -247,12 +248,5 @@ mod tests {
         let course = Aim::default().course(&steered, PI / 2.0, 1.0, &STILL, 0.01);
         assert!(course.ahead.abs() < 1e-9 && (course.left - 2.0).abs() < 1e-9 && course.turn == 0.0, "{course:?}");
         assert!((Aim::default().course(&steered, PI, 0.5, &STILL, 0.01).ahead + 1.5).abs() < 1e-9);
-    }
-
-    #[test]
-    fn angles_are_wrapped() {
-        for (angle, expected) in [(0.0, 0.0), (3.5, 3.5 - TAU), (-3.5, TAU - 3.5), (7.0, 7.0 - TAU)] {
-            assert!((wrap(angle) - expected).abs() < 1e-12, "{angle}");
-        }
     }
 }

@@ -52,7 +52,10 @@ fn commands(app: &mut App) -> Vec<(f64, bool)> {
 fn stick_and_arrow_keys_steer_the_character_in_focus() {
     let mut app = game(&["--agents", "2"]);
     let pad = pad(&mut app);
-    assert_eq!(*app.world().resource::<Steering>(), Steering { on: true, buttons: false, by_camera: false });
+    assert_eq!(
+        *app.world().resource::<Steering>(),
+        Steering { on: true, buttons: false, by_camera: false, flying: false }
+    );
     let own = commands(&mut app);
     assert!(own.iter().all(|(x, mine)| x.abs() <= 2.0 && !mine) && own[0] != own[1], "{own:?}");
     // beyond the dead zone of 0.12 it begins at 0, and its end is the range's
@@ -256,10 +259,10 @@ fn camera(app: &mut App) -> (Mut<'_, FollowCamera>, Transform) {
 fn the_stick_points_into_the_picture() {
     let mut app = game_of("MarathonManController", &["--seed", "3"]);
     let pad = pad(&mut app);
-    let steering = Steering { on: true, buttons: true, by_camera: true };
+    let steering = Steering { on: true, buttons: true, by_camera: true, flying: false };
     assert_eq!((*app.world().resource::<Steering>(), camera(&mut app).0.mode), (steering, CameraMode::Chase));
     // it stands where it is put
-    camera(&mut app).0.mode = CameraMode::Free;
+    camera(&mut app).0.mode = CameraMode::Held;
     for (x, y) in [(0.0, 0.6), (0.6, 0.0), (0.0, -0.6), (-0.6, 0.0), (0.45, 0.45)] {
         push(&mut app, pad, GamepadAxis::LeftStickX, x);
         push(&mut app, pad, GamepadAxis::LeftStickY, y);
@@ -307,6 +310,22 @@ fn shift_runs_and_letters_walk() {
     assert_eq!(app.world().resource::<Time<Virtual>>().relative_speed(), 1.0);
 }
 
+/// Height of the only character's pelvis, m.
+fn pelvis(app: &mut App) -> f32 {
+    let mut query = app.world_mut().query_filtered::<&RagdollState, With<Actor>>();
+    let key = query.single(app.world()).expect("one character");
+    app.world().resource::<Marathon>().state(key).expect("it is simulated").qpos[2] as f32
+}
+
+/// Half of the camera's vertical field of view, rad.
+fn lens(app: &mut App) -> f32 {
+    let mut query = app.world_mut().query_filtered::<&Projection, With<FollowCamera>>();
+    match query.single(app.world()).expect("one camera") {
+        Projection::Perspective(lens) => 0.5 * lens.fov,
+        _ => panic!("it has a perspective"),
+    }
+}
+
 /// On a circle of five meters the character stays in the middle third of the picture, and the camera gets behind it.
 #[test]
 fn the_camera_stays_behind_who_runs_in_a_circle() {
@@ -315,16 +334,17 @@ fn the_camera_stays_behind_who_runs_in_a_circle() {
     // 1.5 m/s and 0.3 rad/s, beyond the dead zone
     push(&mut app, pad, GamepadAxis::LeftStickY, 0.56);
     push(&mut app, pad, GamepadAxis::LeftStickX, -0.288);
-    let (mut most, mut places) = (0.0_f32, Vec::new());
+    let (mut aside, mut over, mut places) = (0.0_f32, 0.0_f32, Vec::new());
     for frame in 0..50 * 30 {
         app.update();
         let place = motion(&mut app).0;
         places.push(place);
         let (_, at) = camera(&mut app);
-        let seen = at.compute_affine().inverse().transform_point3(place.with_y(1.0));
-        // half of the picture's width at a distance of 1 m: 0.75 rad from top to bottom, 16 to 9
-        let half = (0.5_f32 * 0.75).tan() * 16.0 / 9.0;
-        most = most.max((seen.x / (-seen.z * half)).abs());
+        let seen = at.compute_affine().inverse().transform_point3(place.with_y(pelvis(&mut app)));
+        // half of the picture's height at a distance of 1 m; the picture is 16 to 9
+        let half = lens(&mut app).tan();
+        aside = aside.max((seen.x / (-seen.z * half * 16.0 / 9.0)).abs());
+        over = over.max((seen.y / (-seen.z * half)).abs());
         assert!(at.translation.y > 0.05, "above the ground");
         // his way in the last second: a step sways
         if frame > 50 * 10 {
@@ -332,7 +352,7 @@ fn the_camera_stays_behind_who_runs_in_a_circle() {
             assert!(behind < 60.0, "{behind} degrees after {frame} frames");
         }
     }
-    assert!(most < 1.0 / 3.0, "{most} of half the picture");
+    assert!(aside < 1.0 / 3.0 && over < 1.0 / 3.0, "{aside} of half the width, {over} of half the height");
 }
 
 /// The ends of the episodes so far.

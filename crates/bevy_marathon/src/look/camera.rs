@@ -1,30 +1,31 @@
-//! A camera that follows a ragdoll, smoothly, or circles it.
+//! A camera that follows a ragdoll, smoothly, circles it, or flies.
 
+use crate::look::obstacle::Obstacles;
+use crate::look::orbit::{Motion, Sight};
 use crate::look::quality::{HORIZON, Quality};
 use crate::plugin::MarathonSystems;
-use crate::ragdoll::{Anatomy, Episode, Part};
+use crate::ragdoll::{Anatomy, Episode, OwnGround, Part};
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::prelude::*;
-use std::f32::consts::{FRAC_PI_2, PI};
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
-/// Seconds in which the camera makes up two thirds of the way, sideways and up; a gait's bounce must not shake it.
-const EASE: [f32; 2] = [0.18, 0.55];
-/// The same for turns and zoom.
-const EASE_TURN: f32 = 0.15;
-/// Speed of the target, m/s, up to which the camera looks ahead.
-const FASTEST: f32 = 12.0;
 /// Radians per second of [`CameraMode::Orbit`].
 const ORBIT_SPEED: f32 = 0.25;
-/// Largest turn rate with which [`CameraMode::Chase`] gets behind its target, rad/s; it is that at a right angle.
-const CHASE_SPEED: f32 = 0.9;
-/// Speed from which on it turns that fast, m/s; at rest it does not turn.
-const CHASE_FROM: f32 = 1.0;
-/// Seconds for which it does not turn by itself after [`FollowCamera::turn`].
-const CHASE_PAUSE: f32 = 2.5;
-/// Cosine of the tilt up to which a target counts as upright.
-const UPRIGHT: f32 = 0.7;
+/// Lowest and highest angle above the ground, rad: -10 and 60 degrees.
+const PITCH: [f32; 2] = [-0.1745, FRAC_PI_3];
+/// The same for [`CameraMode::Free`].
+const FREE_PITCH: f32 = 1.5;
+/// Closest and farthest [`FollowCamera::zoom`], m.
+const DISTANCE: [f32; 2] = [0.6, 60.0];
+/// What the field of view opens by at a full run, rad: 6 degrees.
+const WIDER: f32 = 0.1047;
+/// Distance of things that are still drawn, m.
+const FAR: f32 = 1000.0;
+/// Distances below which a target is not drawn, and from which on it is again, m: from inside, a body hides everything.
+const HIDDEN: [f32; 2] = [1.0, 1.1];
 
-/// Moves [`FollowCamera`]s. The app decides what input turns them.
+/// Moves [`FollowCamera`]s. The app decides what input turns them: turn them before the fixed loop, in
+/// [`RunFixedMainLoopSystems::BeforeFixedMainLoop`], so that the same frame shows it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FollowCameraPlugin;
 
@@ -33,7 +34,10 @@ impl Plugin for FollowCameraPlugin {
         app.register_type::<FollowCamera>();
         app.add_systems(
             RunFixedMainLoop,
-            follow.in_set(RunFixedMainLoopSystems::AfterFixedMainLoop).after(MarathonSystems::Show),
+            (follow, hide_near)
+                .chain()
+                .in_set(RunFixedMainLoopSystems::AfterFixedMainLoop)
+                .after(MarathonSystems::Show),
         )
         .add_systems(PreUpdate, equip);
     }
@@ -45,19 +49,21 @@ pub enum CameraMode {
     /// Beside the runner, a little ahead.
     #[default]
     Side,
-    /// Behind it. It turns slowly to where the target faces while the target moves, but not around for one that comes towards it.
+    /// Behind it. It turns slowly to where the target moves, but not around for one that comes towards it.
     Chase,
     /// Around it, slowly.
     Orbit,
-    /// Where it was put.
+    /// At the angle at which it was put.
+    Held,
+    /// Anywhere: it follows nothing. [`FollowCamera::fly`] moves it.
     Free,
 }
 
 impl CameraMode {
-    /// The next one.
+    /// The next one of those that a player chooses.
     pub fn next(self) -> Self {
         match self {
-            CameraMode::Side => CameraMode::Chase,
+            CameraMode::Side | CameraMode::Held => CameraMode::Chase,
             CameraMode::Chase => CameraMode::Orbit,
             CameraMode::Orbit => CameraMode::Free,
             CameraMode::Free => CameraMode::Side,
@@ -70,6 +76,7 @@ impl CameraMode {
             CameraMode::Side => "side",
             CameraMode::Chase => "chase",
             CameraMode::Orbit => "orbit",
+            CameraMode::Held => "held",
             CameraMode::Free => "free",
         }
     }
@@ -79,12 +86,17 @@ impl CameraMode {
         match self {
             CameraMode::Side => Some(-0.42),
             CameraMode::Chase => Some(-FRAC_PI_2),
-            CameraMode::Orbit | CameraMode::Free => None,
+            CameraMode::Orbit | CameraMode::Held | CameraMode::Free => None,
         }
+    }
+
+    /// The angles above the ground that it may look from, rad.
+    fn pitch(self) -> [f32; 2] {
+        if self == CameraMode::Free { [-FREE_PITCH, FREE_PITCH] } else { PITCH }
     }
 }
 
-/// A 3-D camera that follows a ragdoll.
+/// A 3-D camera that follows a ragdoll. It does not enter the ground and the fixed shapes of the ragdoll's model.
 #[derive(Component, Clone, Debug, Reflect)]
 #[reflect(Component, Clone, Debug)]
 #[require(Camera3d)]
@@ -104,14 +116,20 @@ pub struct FollowCamera {
     pub focus: Vec3,
     /// How far ahead of whom it follows that is, m.
     pub ahead: f32,
-    /// The angles and the distance it is on the way to.
+    /// The angles and the distance it is on the way to. The distance is that of a target at rest.
     pub goal: [f32; 3],
-    /// It has arrived somewhere before; the first time it jumps.
-    settled: bool,
+    /// Vertical field of view while the target is at rest, rad. It opens by 6 degrees up to 4 m/s.
+    pub field_of_view: f32,
+    /// Whether it moves only as its target and the player move it: no turn of its own, and the same distance and field of view at
+    /// every speed.
+    pub reduced_motion: bool,
+    /// What it remembers from frame to frame.
+    #[reflect(ignore)]
+    motion: Motion,
     /// It is to get behind its target at once.
     align: bool,
-    /// Seconds until it turns by itself again.
-    pause: f32,
+    /// Way to fly in the next frame, in the camera's axes, m.
+    flight: Vec3,
 }
 
 impl Default for FollowCamera {
@@ -120,14 +138,16 @@ impl Default for FollowCamera {
             target: None,
             mode: CameraMode::Side,
             yaw: -0.42,
-            pitch: 0.2,
-            distance: 5.0,
+            pitch: 0.26,
+            distance: 3.8,
             focus: Vec3::Y,
             ahead: 0.0,
-            goal: [-0.42, 0.2, 5.0],
-            settled: false,
+            goal: [-0.42, 0.26, 3.8],
+            field_of_view: FRAC_PI_3,
+            reduced_motion: false,
+            motion: Motion::default(),
             align: false,
-            pause: 0.0,
+            flight: Vec3::ZERO,
         }
     }
 }
@@ -138,29 +158,42 @@ impl FollowCamera {
         FollowCamera { target: Some(target), ..default() }
     }
 
-    /// Turns it about what it follows. [`CameraMode::Side`] then no longer keeps to its side, and [`CameraMode::Chase`] waits before
-    /// it turns by itself.
+    /// Turns it about what it follows, or about itself if it is [free](CameraMode::Free), rad. [`CameraMode::Side`] then no longer
+    /// keeps to its side, and [`CameraMode::Chase`] waits before it turns by itself.
     pub fn turn(&mut self, yaw: f32, pitch: f32) {
         if self.mode == CameraMode::Side {
-            self.mode = CameraMode::Free;
+            self.mode = CameraMode::Held;
         }
-        self.pause = CHASE_PAUSE;
+        self.motion.wait();
+        self.align = false;
+        let [lowest, highest] = self.mode.pitch();
         self.goal[0] += yaw;
-        self.goal[1] = (self.goal[1] + pitch).clamp(-0.05, 1.45);
+        self.goal[1] = (self.goal[1] + pitch).clamp(lowest, highest);
     }
 
     /// Moves it closer (below 1) or away.
     pub fn zoom(&mut self, factor: f32) {
-        self.goal[2] = (self.goal[2] * factor).clamp(0.8, 60.0);
+        self.goal[2] = (self.goal[2] * factor).clamp(DISTANCE[0], DISTANCE[1]);
+    }
+
+    /// Moves a [free](CameraMode::Free) camera, m: to its right, up, and backward along its own axes.
+    pub fn fly(&mut self, way: Vec3) {
+        self.flight += way;
     }
 
     /// Looks from where a mode looks.
     pub fn set_mode(&mut self, mode: CameraMode) {
+        if (self.mode == CameraMode::Free) != (mode == CameraMode::Free) {
+            self.motion.cut();
+        }
         self.mode = mode;
-        (self.align, self.pause) = (mode == CameraMode::Chase, 0.0);
+        self.align = mode == CameraMode::Chase;
+        self.motion.go_on();
         if let Some(yaw) = mode.yaw() {
             self.face(yaw);
         }
+        let [lowest, highest] = mode.pitch();
+        self.goal[1] = self.goal[1].clamp(lowest, highest);
     }
 
     /// Turns to an angle, the short way round.
@@ -169,24 +202,57 @@ impl FollowCamera {
         self.goal[0] = yaw + turns * 2.0 * PI;
     }
 
-    /// Gets behind a target that faces an angle about the vertical, rad, and moves at a speed, m/s.
-    fn chase(&mut self, heading: f32, speed: f32, dt: f32) {
-        let yaw = heading - FRAC_PI_2;
-        if self.align {
-            self.align = false;
-            self.face(yaw);
-        }
-        self.pause = (self.pause - dt).max(0.0);
-        if self.pause == 0.0 {
-            // one that comes towards it is seen from the front
-            self.goal[0] += CHASE_SPEED * (yaw - self.goal[0]).sin() * (speed / CHASE_FROM).min(1.0) * dt;
-        }
-    }
-
     /// Makes the next frame jump to the target instead of moving there.
     pub fn jump(&mut self) {
-        self.settled = false;
+        self.motion.cut();
         self.align = self.mode == CameraMode::Chase;
+    }
+
+    /// Direction from the point that it looks at to itself.
+    fn away(&self) -> Vec3 {
+        // the runner's right side is at +z
+        Quat::from_rotation_y(self.yaw) * Quat::from_rotation_x(-self.pitch) * Vec3::Z
+    }
+
+    /// Takes the angles a part of the way to where they go, for a frame of `dt` seconds.
+    fn turn_on(&mut self, dt: f32) {
+        if self.mode == CameraMode::Orbit {
+            self.goal[0] += ORBIT_SPEED * dt;
+        }
+        [self.yaw, self.pitch] = self.motion.eased([self.yaw, self.pitch], [self.goal[0], self.goal[1]], dt);
+    }
+
+    /// Follows what it sees. Returns where it is and where it looks from there.
+    fn orbit(&mut self, sight: &Sight, obstacles: &Obstacles) -> Transform {
+        if let Some(to) = self.motion.track(sight, self.focus, obstacles) {
+            self.focus = to;
+        }
+        if self.mode == CameraMode::Chase {
+            if let Some(heading) = sight.heading.filter(|_| self.align) {
+                self.align = false;
+                self.face(heading - FRAC_PI_2);
+            }
+            if !self.reduced_motion {
+                self.goal[0] += self.motion.drift(self.goal[0], sight.dt);
+            }
+        }
+        self.turn_on(sight.dt);
+        let away = self.away();
+        let wanted = self.goal[2] * if self.reduced_motion { 1.0 } else { self.motion.farther() };
+        let (eye, distance) = self.motion.place(self.focus, away, wanted, obstacles, sight.dt);
+        self.distance = distance;
+        Transform::from_translation(eye).looking_to((self.focus - eye).normalize_or(-away), Vec3::Y)
+    }
+
+    /// Flies from a place.
+    fn flown(&mut self, from: Vec3, obstacles: &Obstacles, dt: f32) -> Transform {
+        self.turn_on(dt);
+        let away = self.away();
+        let place = Transform::from_translation(from).looking_to(-away, Vec3::Y);
+        let to = from + place.rotation * std::mem::take(&mut self.flight);
+        let place = place.with_translation(Motion::above_ground(to, obstacles));
+        self.focus = place.translation - self.distance * away;
+        place
     }
 }
 
@@ -203,98 +269,70 @@ fn equip(mut commands: Commands, quality: Option<Res<Quality>>, cameras: Query<E
     }
 }
 
+/// Places the cameras. The parts of the ragdolls are where this frame shows them.
+#[expect(clippy::type_complexity, reason = "a query names what it reads")]
 fn follow(
     time: Res<Time<Real>>,
     game: Res<Time<Virtual>>,
     mut cameras: Query<(&mut FollowCamera, &mut Transform, &mut Projection), Without<Part>>,
-    ragdolls: Query<(&Anatomy, &Transform, Option<&Episode>), Without<FollowCamera>>,
+    ragdolls: Query<(&Anatomy, &Transform, Option<&Episode>, Option<&OwnGround>), Without<FollowCamera>>,
     parts: Query<&Transform, (With<Part>, Without<FollowCamera>)>,
 ) {
-    // the picture's own time: one looks about while the game's stands still
-    let dt = time.delta_secs();
-    let pace = if dt > 0.0 { game.delta_secs() / dt } else { 1.0 };
-    let ease = |seconds: f32| 1.0 - (-dt / seconds).exp();
     for (mut camera, mut transform, mut projection) in &mut cameras {
-        if let Projection::Perspective(p) = &mut *projection
-            && p.far < 1000.0
+        let camera = &mut *camera;
+        let target = camera.target.and_then(|target| Some((target, ragdolls.get(target).ok()?)));
+        let part = |part: Entity| parts.get(part).ok().copied();
+        let (mut obstacles, mut sight) = (Obstacles::default(), Sight::nothing(time.delta_secs()));
+        if let Some((target, (anatomy, track, episode, own))) = target {
+            obstacles = Obstacles::of(anatomy, own, track, part);
+            sight.target(target, anatomy, track, episode, part);
+            sight.lead(track.rotation * Vec3::X * camera.ahead);
+        }
+        sight.game_dt = game.delta_secs();
+        *transform = match camera.mode {
+            CameraMode::Free => camera.flown(transform.translation, &obstacles, sight.dt),
+            _ => camera.orbit(&sight, &obstacles),
+        };
+        let wider = if camera.reduced_motion || camera.mode == CameraMode::Free { 0.0 } else { camera.motion.speed() };
+        let fov = camera.field_of_view + WIDER * wider;
+        if let Projection::Perspective(now) = &*projection
+            && (now.fov, now.far) != (fov, FAR)
+            && let Projection::Perspective(lens) = &mut *projection
         {
-            (p.far, p.fov) = (1000.0, 0.75);
+            (lens.fov, lens.far) = (fov, FAR);
         }
-        if let Some((anatomy, track, episode)) = camera.target.and_then(|t| ragdolls.get(t).ok()) {
-            let root = anatomy.model.joints.first().map_or(1, |j| j.body);
-            if let Some(part) = anatomy.parts.get(root).and_then(|p| parts.get(*p).ok()) {
-                // what eases after a runner stays behind by its speed times the easing
-                let ahead = episode.map_or(0.0, |e| (e.speed * pace).clamp(-FASTEST, FASTEST) * EASE[0]);
-                let to = track.transform_point(part.translation) + track.rotation * (Vec3::X * (ahead + camera.ahead));
-                let jump = !camera.settled || camera.focus.distance(to) > 12.0;
-                let [side, up] = if jump { [1.0; 2] } else { EASE.map(ease) };
-                let focus = camera.focus;
-                camera.focus = focus + (to - focus) * Vec3::new(side, up, side);
-                camera.settled = true;
-                let facing = track.rotation * part.rotation;
-                // in a flip, or on the ground, a character faces nowhere
-                if camera.mode == CameraMode::Chase && (facing * Vec3::Y).y > UPRIGHT {
-                    let forward = facing * Vec3::X;
-                    let [ahead, left] = episode.map_or([0.0; 2], |e| e.own_velocity);
-                    camera.chase((-forward.z).atan2(forward.x), ahead.hypot(left) * pace, dt);
-                }
-            }
-        }
-        if camera.mode == CameraMode::Orbit {
-            camera.goal[0] += ORBIT_SPEED * dt;
-        }
-        let [yaw, pitch, distance] = camera.goal;
-        let share = ease(EASE_TURN);
-        camera.yaw += (yaw - camera.yaw) * share;
-        camera.pitch += (pitch - camera.pitch) * share;
-        camera.distance += (distance - camera.distance) * share;
-        // the runner's right side is at +z
-        let turn = Quat::from_rotation_y(camera.yaw) * Quat::from_rotation_x(-camera.pitch);
-        let mut eye = camera.focus + turn * (Vec3::Z * camera.distance);
-        eye.y = eye.y.max(0.08);
-        *transform = Transform::from_translation(eye).looking_at(camera.focus, Vec3::Y);
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// On a ragdoll: a camera is so close that it is not drawn.
+#[derive(Component)]
+pub(crate) struct TooNear;
 
-    /// A camera behind a runner along +x.
-    fn chasing() -> FollowCamera {
-        let mut camera = FollowCamera::default();
-        camera.set_mode(CameraMode::Chase);
-        camera.chase(0.0, 0.0, 0.0);
-        camera
-    }
-
-    #[test]
-    fn it_gets_behind_a_target_that_moves() {
-        let mut camera = chasing();
-        assert_eq!(camera.goal[0], -FRAC_PI_2);
-        // a quarter turn to the left, at rest
-        (0..600).for_each(|_| camera.chase(FRAC_PI_2, 0.0, 1.0 / 60.0));
-        assert_eq!(camera.goal[0], -FRAC_PI_2);
-        (0..600).for_each(|_| camera.chase(FRAC_PI_2, 2.0, 1.0 / 60.0));
-        assert!(camera.goal[0].abs() < 0.01, "{}", camera.goal[0]);
-    }
-
-    #[test]
-    fn it_does_not_turn_around_for_one_that_comes_towards_it() {
-        let mut camera = chasing();
-        (0..120).for_each(|_| camera.chase(PI, 2.0, 1.0 / 60.0));
-        assert!((camera.goal[0] + FRAC_PI_2).abs() < 0.01, "{}", camera.goal[0]);
-    }
-
-    #[test]
-    fn a_hand_on_the_camera_goes_before() {
-        let mut camera = chasing();
-        camera.turn(1.0, 0.0);
-        assert_eq!(camera.mode, CameraMode::Chase);
-        let held = camera.goal[0];
-        (0..120).for_each(|_| camera.chase(0.0, 2.0, 1.0 / 60.0));
-        assert_eq!(camera.goal[0], held);
-        (0..600).for_each(|_| camera.chase(0.0, 2.0, 1.0 / 60.0));
-        assert!((camera.goal[0] + FRAC_PI_2).abs() < 0.02, "{}", camera.goal[0]);
+/// Hides the parts of ragdolls that a camera is about to enter, and shows them again.
+fn hide_near(
+    mut commands: Commands,
+    cameras: Query<&FollowCamera>,
+    ragdolls: Query<(Entity, &Anatomy, Has<TooNear>)>,
+    mut parts: Query<&mut Visibility, With<Part>>,
+) {
+    for (ragdoll, anatomy, hidden) in &ragdolls {
+        let limit = HIDDEN[usize::from(hidden)];
+        let close = |camera: &FollowCamera| {
+            camera.target == Some(ragdoll) && camera.mode != CameraMode::Free && camera.distance < limit
+        };
+        let hide = cameras.iter().any(close);
+        if hide == hidden {
+            continue;
+        }
+        let bodies = anatomy.parts.iter().zip(&anatomy.model.bodies).filter(|(_, body)| body.weld_id != 0);
+        for (part, _) in bodies {
+            if let Ok(mut visibility) = parts.get_mut(*part) {
+                *visibility = if hide { Visibility::Hidden } else { Visibility::Inherited };
+            }
+        }
+        match hide {
+            true => commands.entity(ragdoll).insert(TooNear),
+            false => commands.entity(ragdoll).remove::<TooNear>(),
+        };
     }
 }

@@ -3,16 +3,20 @@
 
 mod body;
 mod camera;
+mod foot_lock;
 mod ghost;
 mod ground;
 mod marks;
 mod meters;
+mod obstacle;
+mod orbit;
 mod quality;
 mod scenery;
 mod skin;
 
 pub use body::{LookPlugin, Tint, joint_places};
 pub use camera::{CameraMode, FollowCamera, FollowCameraPlugin};
+pub use foot_lock::FootLock;
 pub use ghost::{ErrorColors, Ghost, GhostPlugin, part_errors};
 pub use marks::{Marks, MarksPlugin, commanded_velocity};
 pub use quality::Quality;

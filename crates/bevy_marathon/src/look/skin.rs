@@ -6,9 +6,11 @@
 
 use crate::axes::{to_game, to_physics};
 use crate::look::body::BodyMesh;
+use crate::look::camera::TooNear;
+use crate::look::foot_lock::{FootLock, Legs, Stance};
 use crate::look::ghost::ErrorColors;
 use crate::plugin::MarathonSystems;
-use crate::ragdoll::{Anatomy, Part};
+use crate::ragdoll::{Anatomy, Episode, Part};
 use bevy::asset::{AssetLoadError, LoadState};
 use bevy::camera::visibility::NoFrustumCulling;
 use bevy::ecs::entity::EntityHashMap;
@@ -33,6 +35,7 @@ impl Plugin for SkinPlugin {
     fn build(&self, app: &mut App) {
         let shown = RunFixedMainLoopSystems::AfterFixedMainLoop;
         app.register_type::<Skin>()
+            .register_type::<FootLock>()
             .add_systems(Update, (put_on, fit).chain())
             .add_systems(RunFixedMainLoop, (wear, hide).in_set(shown).after(MarathonSystems::Show));
     }
@@ -41,6 +44,7 @@ impl Plugin for SkinPlugin {
 /// A glTF character that a ragdoll wears in place of its shapes.
 #[derive(Component, Clone, Debug, PartialEq, Reflect)]
 #[reflect(Component, Clone, Debug, PartialEq)]
+#[require(FootLock)]
 pub struct Skin {
     /// A scene with a skinned mesh, such as `GltfAssetLabel::Scene(0).from_asset("hero.glb")`. Its lights and cameras are left out.
     pub scene: Handle<WorldAsset>,
@@ -97,6 +101,7 @@ struct Fitted {
     bones: Vec<Entity>,
     /// Transform above the first bone, in the axes of the ragdoll: position, rotation and scale.
     above: Transform,
+    legs: Legs,
 }
 
 /// Makes room for new skins and removes those that are no longer worn.
@@ -150,7 +155,8 @@ fn fit(
                 let bones = bones.into_iter().map(|bone| spawned[bone]).collect();
                 transform.scale = Vec3::splat(scale);
                 let above = Transform { translation: scale * above.translation, scale: scale * above.scale, ..above };
-                worn.fitted = Some(Fitted { poser, bones, above });
+                let legs = Legs::of(anatomy, &poser);
+                worn.fitted = Some(Fitted { poser, bones, above, legs });
                 commands.entity(worn.ragdoll).insert(Dressed);
             }
             Err(problem) => {
@@ -279,20 +285,26 @@ fn skeleton(tree: &[Node]) -> Option<(Transform, Vec<usize>, Skeleton)> {
 
 /// Lets skins follow the bodies of their ragdolls.
 fn wear(
-    clothes: Query<&Clothes>,
-    ragdolls: Query<&Anatomy>,
+    time: Res<Time<Virtual>>,
+    mut clothes: Query<&mut Clothes>,
+    ragdolls: Query<(&Anatomy, Option<&Episode>, Option<&FootLock>)>,
     parts: Query<&Transform, With<Part>>,
     mut bones: Query<&mut Transform, Without<Part>>,
 ) {
-    for worn in &clothes {
-        let (Some(fitted), Ok(anatomy)) = (&worn.fitted, ragdolls.get(worn.ragdoll)) else { continue };
+    for mut worn in &mut clothes {
+        let Clothes { ragdoll, fitted } = &mut *worn;
+        let (Some(fitted), Ok((anatomy, episode, lock))) = (fitted, ragdolls.get(*ragdoll)) else { continue };
         let body = |part: &Entity| {
             let Transform { translation, rotation, .. } = *parts.get(*part).ok()?;
             let [x, y, z] = to_physics(rotation.xyz());
             Some((to_physics(translation), [f64::from(rotation.w), x, y, z]))
         };
         let Some(bodies) = anatomy.parts.iter().map(body).collect::<Option<Vec<_>>>() else { continue };
-        let frame = fitted.poser.pose(&bodies);
+        let mut frame = fitted.poser.pose(&bodies);
+        if lock.is_some_and(|lock| lock.on) {
+            let stance = Stance { bodies: &bodies, episode, dt: time.delta_secs_f64() };
+            fitted.legs.stand(&fitted.poser, &mut frame, &stance);
+        }
         for (i, (entity, turn)) in fitted.bones.iter().zip(&frame.rotations).enumerate() {
             let Ok(mut bone) = bones.get_mut(*entity) else { continue };
             let [w, x, y, z] = turn.map(|x| x as f32);
@@ -310,14 +322,15 @@ fn wear(
 
 /// Hides the shapes of ragdolls that wear a skin, or the skin where the shapes have something to show.
 fn hide(
-    dressed: Query<Has<ErrorColors>, With<Dressed>>,
+    dressed: Query<(Has<ErrorColors>, Has<TooNear>), With<Dressed>>,
     mut clothes: Query<(&Clothes, &mut Visibility), Without<BodyMesh>>,
     mut shapes: Query<(&BodyMesh, &mut Visibility), Without<Clothes>>,
 ) {
-    let worn = |ragdoll: Entity| dressed.get(ragdoll).is_ok_and(|errors| !errors);
+    let worn = |ragdoll: Entity| dressed.get(ragdoll).is_ok_and(|(errors, _)| !errors);
+    let near = |ragdoll: Entity| dressed.get(ragdoll).is_ok_and(|(_, near)| near);
     let shown = |on: bool| if on { Visibility::Inherited } else { Visibility::Hidden };
     for (clothes, mut visibility) in &mut clothes {
-        visibility.set_if_neq(shown(worn(clothes.ragdoll)));
+        visibility.set_if_neq(shown(worn(clothes.ragdoll) && !near(clothes.ragdoll)));
     }
     for (shape, mut visibility) in &mut shapes {
         visibility.set_if_neq(shown(!worn(shape.0)));

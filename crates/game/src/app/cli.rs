@@ -145,6 +145,10 @@ pub struct Args {
     /// Place of the camera [default: behind a character that turns, beside others].
     #[arg(long, value_parser = one_of(CAMERAS))]
     pub camera: Option<CameraMode>,
+    /// Move the camera only as the character and the player move it: no turns of its own, no change of its distance and its
+    /// field of view with the speed.
+    #[arg(long)]
+    pub reduced_motion: bool,
     /// Limit on the frames per second of the window; 0 for the rate of the screen.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub max_fps: u32,
@@ -345,10 +349,11 @@ const QUALITIES: [Choice<Quality>; 3] = [
     ("high", Quality::High, "Larger shadow maps"),
 ];
 
-const CAMERAS: [Choice<CameraMode>; 3] = [
+const CAMERAS: [Choice<CameraMode>; 4] = [
     (CameraMode::Side.name(), CameraMode::Side, "Beside the runner"),
     (CameraMode::Chase.name(), CameraMode::Chase, "Behind it"),
     (CameraMode::Orbit.name(), CameraMode::Orbit, "Around it"),
+    (CameraMode::Free.name(), CameraMode::Free, "Anywhere: W A S D, E and Q fly it"),
 ];
 
 /// Reads one of the choices by its name.

@@ -5,7 +5,7 @@ use crate::app::error::GameError;
 use crate::app::features::course::{Runs, check_table};
 use crate::app::features::replay::play::Playback;
 use crate::app::features::training::{TrainingOptions, settings};
-use crate::app::input::camera::ChosenCamera;
+use crate::app::input::camera::{CameraSettings, ChosenCamera};
 use crate::app::input::scripted::{ScriptedActions, ScriptedInputs};
 use crate::app::mode::Mode;
 use crate::app::stage::actors::ShownMarks;
@@ -90,6 +90,7 @@ impl GamePlugin {
             .insert_resource(ShownMarks { contacts: args.contacts, joints: args.joints })
             .insert_resource(TrainingOptions { learn: args.learn.clone(), seed: args.seed() })
             .insert_resource(ChosenCamera(args.camera))
+            .insert_resource(CameraSettings { reduced_motion: args.reduced_motion, ..default() })
             .insert_resource(args.steering)
             .insert_resource(args.fixed_settings())
             .insert_resource(args.mappings())

@@ -32,6 +32,7 @@ pub use features::training::{TrainingOptions, TrainingRun};
 pub use game::{GamePlugin, KeysPlugin};
 pub use input::actions::{Action, ActionPressed, ActionRequested, Steering};
 pub use input::bindings::{Bindings, Rebinding};
+pub use input::camera::CameraSettings;
 pub use input::response::{Mapping, Mappings};
 pub use input::scripted::{ScriptedAction, ScriptedActions, ScriptedInput, ScriptedInputs};
 pub use launch::{main, run};

@@ -85,7 +85,10 @@ pub const MOVE_KEYS: [KeyCode; 4] = [KeyCode::KeyW, KeyCode::KeyS, KeyCode::KeyA
 pub const RUN_KEYS: [KeyCode; 2] = [KeyCode::ShiftLeft, KeyCode::ShiftRight];
 /// Keys for the first and the second button of a command, such as a jump, for characters that turn.
 pub const COMMAND_KEYS: [KeyCode; 2] = [KeyCode::Space, KeyCode::KeyV];
-/// Gamepad buttons for the same.
+/// Keys that fly a free camera: ahead and back, to the left and right, up and down.
+pub const FLY_KEYS: [KeyCode; 6] =
+    [KeyCode::KeyW, KeyCode::KeyS, KeyCode::KeyA, KeyCode::KeyD, KeyCode::KeyE, KeyCode::KeyQ];
+/// Gamepad buttons for the same as [`COMMAND_KEYS`].
 pub const COMMAND_BUTTONS: [GamepadButton; 2] = [GamepadButton::South, GamepadButton::East];
 
 /// The devices that steer the character in focus.
@@ -97,6 +100,8 @@ pub struct Steering {
     pub buttons: bool,
     /// The `MOVE_KEYS`: a stick points to a direction of the picture.
     pub by_camera: bool,
+    /// The `FLY_KEYS`: they fly the camera, and no key steers.
+    pub flying: bool,
 }
 
 impl Steering {
@@ -105,6 +110,7 @@ impl Steering {
         self.on && STEERING_KEYS.contains(&key)
             || self.buttons && COMMAND_KEYS.contains(&key)
             || self.by_camera && MOVE_KEYS.contains(&key)
+            || self.flying && FLY_KEYS.contains(&key)
     }
 
     /// Whether a gamepad button steers and has no other action.

@@ -1,8 +1,7 @@
 //! Mouse, sticks and keys move the camera. A key saves a picture.
 
 use crate::app::files::free_name;
-use crate::app::input::actions::{Action, ActionPressed, Steering};
-use crate::app::input::steering::turns;
+use crate::app::input::actions::{Action, ActionPressed, FLY_KEYS, RUN_KEYS, Steering};
 use crate::app::mode::AppSet;
 use crate::app::mode::Mode;
 use crate::app::notifications::Notifications;
@@ -14,21 +13,49 @@ use bevy::prelude::*;
 use bevy::render::view::screenshot::{Screenshot, save_to_disk};
 use bevy_egui::PrimaryEguiContext;
 use bevy_egui::input::EguiWantsInput;
-use bevy_marathon::Anatomy;
 use bevy_marathon::look::{CameraMode, FollowCamera};
+use bevy_marathon::{Anatomy, MoveDirection};
 
 /// Radians per pixel of the mouse, and per second of a stick.
 const TURN: [f32; 2] = [0.005, 2.2];
+/// Speed of a free camera, m/s, and with Shift.
+const FLIGHT: [f32; 2] = [3.0, 12.0];
+/// Deflection of a stick that counts as none.
+const DEAD_ZONE: f32 = 0.12;
+
+/// The player's settings of the camera.
+#[derive(Resource, Clone, Copy, Debug, PartialEq)]
+pub struct CameraSettings {
+    /// Vertical field of view, rad.
+    pub field_of_view: f32,
+    /// Factor of the turns by mouse and stick.
+    pub sensitivity: f32,
+    /// Whether mouse or stick up looks down.
+    pub invert_y: bool,
+    /// Whether the camera moves only as the character and the player move it.
+    pub reduced_motion: bool,
+}
+
+impl Default for CameraSettings {
+    fn default() -> Self {
+        let FollowCamera { field_of_view, reduced_motion, .. } = FollowCamera::default();
+        CameraSettings { field_of_view, sensitivity: 1.0, invert_y: false, reduced_motion }
+    }
+}
 
 /// The place of the camera that the user has chosen. Without one, it is behind characters that turn, and beside others.
 #[derive(Resource)]
 pub struct ChosenCamera(pub Option<CameraMode>);
 
 pub(super) fn plugin(app: &mut App) {
-    app.add_systems(Startup, spawn).add_systems(
-        Update,
-        (next_place.in_set(AppSet::Input), (choose_place, look, save_picture).in_set(AppSet::Present)),
-    );
+    app.init_resource::<CameraSettings>()
+        .add_systems(Startup, spawn)
+        // the same frame shows the turn: the camera is placed after the fixed loop
+        .add_systems(
+            RunFixedMainLoop,
+            (apply_settings, look, fly).chain().in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop),
+        )
+        .add_systems(Update, (next_place.in_set(AppSet::Input), (choose_place, save_picture).in_set(AppSet::Present)));
 }
 
 fn spawn(mut commands: Commands, chosen: Res<ChosenCamera>) {
@@ -46,7 +73,7 @@ fn choose_place(
 ) {
     let first = new.iter().find(|(actor, _)| actor.0 == 0).filter(|_| chosen.0.is_none());
     let Some((_, anatomy)) = first else { return };
-    let steered = anatomy.spec.as_ref().is_some_and(|spec| turns(&spec.command));
+    let steered = anatomy.spec.as_ref().is_some_and(|spec| MoveDirection::moves(&spec.command));
     let behind = steered && matches!(scenario.mode, Mode::Watch | Mode::Push);
     let mode = if behind { CameraMode::Chase } else { CameraMode::Side };
     for mut camera in &mut cameras {
@@ -65,7 +92,18 @@ fn next_place(
             let mode = camera.mode.next();
             camera.set_mode(mode);
             chosen.0 = Some(mode);
-            notes.say(format!("camera: {}", mode.name()));
+            let keys = if mode == CameraMode::Free { ": W A S D, E and Q fly, Shift is faster" } else { "" };
+            notes.say(format!("camera: {}{keys}", mode.name()));
+        }
+    }
+}
+
+/// Gives the cameras the player's settings.
+fn apply_settings(settings: Res<CameraSettings>, mut cameras: Query<&mut FollowCamera>) {
+    for mut camera in &mut cameras {
+        let wanted = (settings.field_of_view, settings.reduced_motion);
+        if (camera.field_of_view, camera.reduced_motion) != wanted {
+            (camera.field_of_view, camera.reduced_motion) = wanted;
         }
     }
 }
@@ -79,7 +117,7 @@ fn look(
     scroll: Res<AccumulatedMouseScroll>,
     wants: Option<Res<EguiWantsInput>>,
     pads: Query<&Gamepad>,
-    (scenario, steering): (Res<Scenario>, Res<Steering>),
+    (scenario, steering, settings): (Res<Scenario>, Res<Steering>, Res<CameraSettings>),
     mut cameras: Query<&mut FollowCamera>,
 ) {
     let over_ui = wants.is_some_and(|w| w.wants_any_pointer_input());
@@ -92,9 +130,9 @@ fn look(
         zoom *= 0.9_f32.powf(scroll.delta.y.clamp(-5.0, 5.0));
     }
     for pad in &pads {
-        let axis = |axis| pad.get(axis).filter(|x: &f32| x.abs() > 0.12).unwrap_or(0.0);
+        let axis = |axis| pad.get(axis).filter(|x: &f32| x.abs() > DEAD_ZONE).unwrap_or(0.0);
         yaw -= axis(GamepadAxis::RightStickX) * TURN[1] * time.delta_secs();
-        pitch += axis(GamepadAxis::RightStickY) * TURN[1] * time.delta_secs();
+        pitch -= axis(GamepadAxis::RightStickY) * TURN[1] * time.delta_secs();
         if !steering.on {
             zoom *= (-axis(GamepadAxis::LeftStickY) * time.delta_secs()).exp();
         }
@@ -102,11 +140,31 @@ fn look(
     if yaw == 0.0 && pitch == 0.0 && zoom == 1.0 {
         return;
     }
+    yaw *= settings.sensitivity;
+    pitch *= if settings.invert_y { -settings.sensitivity } else { settings.sensitivity };
     for mut camera in &mut cameras {
         if yaw != 0.0 || pitch != 0.0 {
             camera.turn(yaw, pitch);
         }
         camera.zoom(zoom);
+    }
+}
+
+/// Flies a free camera by its keys.
+fn fly(
+    time: Res<Time<Real>>,
+    keys: Res<ButtonInput<KeyCode>>,
+    wants: Option<Res<EguiWantsInput>>,
+    mut cameras: Query<&mut FollowCamera>,
+) {
+    if wants.is_some_and(|wants| wants.wants_keyboard_input()) {
+        return;
+    }
+    let [ahead, back, left, right, up, down] = FLY_KEYS.map(|key| f32::from(u8::from(keys.pressed(key))));
+    let way = Vec3::new(right - left, up - down, back - ahead).normalize_or_zero();
+    let speed = FLIGHT[usize::from(keys.any_pressed(RUN_KEYS))];
+    for mut camera in cameras.iter_mut().filter(|camera| camera.mode == CameraMode::Free && way != Vec3::ZERO) {
+        camera.fly(speed * time.delta_secs() * way);
     }
 }
 

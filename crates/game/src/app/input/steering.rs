@@ -16,7 +16,7 @@ use bevy::input::InputSystems;
 use bevy::input::gamepad::{Gamepad, GamepadAxis};
 use bevy::prelude::*;
 use bevy_egui::input::EguiWantsInput;
-use bevy_marathon::look::FollowCamera;
+use bevy_marathon::look::{CameraMode, FollowCamera};
 use bevy_marathon::{AgentCommand, Anatomy, Ground, MoveDirection, RagdollState, Restart};
 use clap::ValueEnum;
 use marathon_envs::CommandRange;
@@ -148,7 +148,7 @@ fn steer(
     (mappings, frame): (Res<Mappings>, Res<SteeringFrame>),
     time: Res<Time<Real>>,
     mut deflections: Local<Deflections>,
-    cameras: Query<&Transform, With<FollowCamera>>,
+    cameras: Query<(&Transform, &FollowCamera)>,
     mut actors: Query<
         (Entity, &Actor, &Anatomy, Option<&mut AgentCommand>, &mut Restart, Option<&mut MoveDirection>),
         With<RagdollState>,
@@ -159,17 +159,18 @@ fn steer(
     let released = actions.read().filter(|action| action.0 == Action::Release).count() > 0 && !on_course;
     let spectator = on_course && scenario.course.role != PlayerRole::Run;
     let typing = wants.is_some_and(|w| w.wants_keyboard_input());
-    let held = of_keys((!typing).then_some(&*keys), steering.by_camera);
+    let flying = cameras.iter().any(|(_, camera)| camera.mode == CameraMode::Free);
+    let held = of_keys((!typing && !flying).then_some(&*keys), steering.by_camera);
     deflections.update(&pads, held, &mappings, time.delta_secs());
-    let (mut own, count) = (Steering::default(), actors.iter().count());
+    let (mut own, count) = (Steering { flying, ..default() }, actors.iter().count());
     for (entity, actor, anatomy, command, mut restart, movement) in &mut actors {
         let ranges = anatomy.spec.as_ref().map_or(&[][..], |spec| &spec.command);
         let player = (actor.0 + count).saturating_sub(focus.0) % count;
         let led = (player < deflections.players() || on_course) && !ranges.is_empty() && !spectator;
         let deflection = deflections.of(player);
-        let by_camera = *frame == SteeringFrame::Camera && turns(ranges) && !on_course;
+        let by_camera = *frame == SteeringFrame::Camera && MoveDirection::moves(ranges) && !on_course;
         if led && player == 0 {
-            own = Steering { on: true, buttons: buttons(ranges).next().is_some(), by_camera };
+            own = Steering { on: true, buttons: buttons(ranges).next().is_some(), by_camera, flying };
         }
         let values = command.as_ref().and_then(|command| command.values());
         let steered = led && !released && (values.is_some() || deflection != REST);
@@ -177,7 +178,8 @@ fn steer(
         if !on_course && *restart != timed {
             *restart = timed;
         }
-        let direction = cameras.iter().next().filter(|_| steered && by_camera).map(|camera| seen(camera, deflection));
+        let direction =
+            cameras.iter().next().filter(|_| steered && by_camera).map(|(camera, _)| seen(camera, deflection));
         match (direction, movement) {
             (Some(direction), Some(mut movement)) if movement.direction != direction => movement.direction = direction,
             (Some(direction), None) => drop(commands.entity(entity).insert(MoveDirection::new(direction))),
@@ -246,11 +248,6 @@ fn seen(camera: &Transform, [ahead, left, ..]: Deflection) -> Vec3 {
     let forward = camera.forward().with_y(0.0).try_normalize().unwrap_or(*camera.up());
     let right = forward.cross(Vec3::Y);
     (ahead * forward - left * right).clamp_length_max(1.0)
-}
-
-/// Whether a command has a speed and a turn.
-pub fn turns(ranges: &[CommandRange]) -> bool {
-    ranges.iter().any(CommandRange::is_speed) && ranges.iter().any(CommandRange::is_turn)
 }
 
 /// The entries of a command that buttons set, for characters that turn.

@@ -160,7 +160,10 @@ fn report(
     if let Some(UnfitSkin(problem)) = unfit.iter().next() {
         let mapping = skin.mapping.as_ref().map(|m| format!(" by the mapping {}", m.path.display()));
         let option = match problem {
-            SkinError::UnknownBones(_) => ": --mapping FILE.json, as `marathon motion import` takes it",
+            SkinError::UnknownBones(_) => {
+                ": pass --mapping FILE.json, a file as `marathon motion import` takes it, or generate a skin for this character \
+                 with `marathon skin`"
+            }
             _ => "",
         };
         let text = format!("{path} cannot be worn{}: {problem}{option}", mapping.unwrap_or_default());

@@ -257,9 +257,9 @@ mod tests {
     use super::*;
     use crate::app::cli::{self, Args};
     use crate::app::features;
-    use crate::app::input::steering::turns;
     use crate::app::mode::Mode;
     use crate::app::stage::policies::ShippedPolicies;
+    use bevy_marathon::MoveDirection;
     use clap::Parser;
     use marathon_runs::TaskConfig;
 
@@ -269,9 +269,9 @@ mod tests {
         let args = Args::parse_from([&["marathon-game"], words].concat());
         let scenario = cli::scenario(&args, &ShippedPolicies::decode())?;
         let ranges = TaskConfig::named(&scenario.agent)?.factory()?.spec().command.clone();
-        let by_camera = turns(&ranges) && scenario.mode != Mode::Course;
+        let by_camera = MoveDirection::moves(&ranges) && scenario.mode != Mode::Course;
         let buttons = controls(&ranges, by_camera).iter().any(|control| control.keys == "Space");
-        let steering = Steering { on: !ranges.is_empty(), buttons, by_camera };
+        let steering = Steering { on: !ranges.is_empty(), buttons, by_camera, flying: false };
         let (bindings, key_hints) = (Bindings::default(), features::key_hints());
         let hints = Hints {
             bindings: &bindings,
