@@ -45,7 +45,7 @@ pub use stage::puppets::Kind as PuppetKind;
 pub use stage::recording::{PlayRecording, Recording, Row};
 pub use stage::scenario::{LoadScenario, PolicySource, Scenario};
 pub use stage::selection::switch_mode;
-pub use stage::skin::{SkinState, WornSkin};
+pub use stage::skin::{SkinChoice, SkinFile, SkinState};
 pub use ui::menu::Menu;
 pub use ui::question::{Asked, Question};
 pub use ui::theme::Hud;
