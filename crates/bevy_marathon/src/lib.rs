@@ -77,9 +77,8 @@ pub use ragdoll::*;
 pub mod prelude {
     #[cfg(feature = "render")]
     pub use crate::look::{
-        ErrorColors, FollowCamera, FollowCameraPlugin, GeneratedSkin, GeneratedSkinPlugin, Ghost, GhostPlugin,
-        LookPlugin, Marks, MarksPlugin, Quality,
-        SceneryPlugin, Skin, SkinPlugin, Tint,
+        DustPlugin, ErrorColors, FollowCamera, FollowCameraPlugin, GeneratedSkin, GeneratedSkinPlugin, Ghost,
+        GhostPlugin, LookPlugin, Marks, MarksPlugin, Quality, SceneryPlugin, Skin, SkinPlugin, Tint,
     };
     pub use crate::plugin::{MarathonPlugin, MarathonSystems};
     pub use crate::ragdoll::*;

@@ -81,7 +81,7 @@ fn make(
 }
 
 /// White, opaque in the middle and clear at the edge.
-fn soft_disc() -> Image {
+pub(super) fn soft_disc() -> Image {
     let half = 0.5 * SIDE as f32;
     let mut data = Vec::with_capacity(4 * SIDE * SIDE);
     for i in 0..SIDE * SIDE {
@@ -204,7 +204,9 @@ fn height(model: &Model, world: Transform, own: Option<&OwnGround>, point: Vec3)
         let own = own.and_then(|own| own.0.get(number));
         let at = |row: usize, column: usize| {
             let i = row.min(field.nrow - 1) * field.ncol + column.min(field.ncol - 1);
-            own.and_then(|own| own.get(i)).copied().unwrap_or_else(|| top as f32 * field.data.get(i).copied().unwrap_or(0.0))
+            own.and_then(|own| own.get(i))
+                .copied()
+                .unwrap_or_else(|| top as f32 * field.data.get(i).copied().unwrap_or(0.0))
         };
         let (row, column) = (v as usize, u as usize);
         let (p, q) = ((v.fract()) as f32, (u.fract()) as f32);

@@ -21,7 +21,6 @@ pub(super) fn plugin(app: &mut App) {
 }
 
 /// Gives cameras the effects of the quality.
-#[expect(clippy::type_complexity, reason = "a bundle names what it holds")]
 fn equip(
     mut commands: Commands,
     quality: Res<Quality>,

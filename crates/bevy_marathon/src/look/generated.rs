@@ -60,7 +60,10 @@ impl Plugin for GeneratedSkinPlugin {
 }
 
 /// Without a renderer there may be nothing that a skin could be made of.
-fn has_assets(scenes: Option<Res<Assets<WorldAsset>>>, poses: Option<Res<Assets<SkinnedMeshInverseBindposes>>>) -> bool {
+fn has_assets(
+    scenes: Option<Res<Assets<WorldAsset>>>,
+    poses: Option<Res<Assets<SkinnedMeshInverseBindposes>>>,
+) -> bool {
     scenes.is_some() && poses.is_some()
 }
 
@@ -126,8 +129,14 @@ fn generate(
 }
 
 /// Removes the skin of a ragdoll that shall no longer have a generated one.
-fn take_off(removed: On<Remove, GeneratedSkin>, mut commands: Commands, skins: Res<GeneratedSkins>, worn: Query<&Skin>) {
-    let generated = |skin: &Skin| skins.0.iter().any(|(_, p)| matches!(p, Progress::Made(scene) if *scene == skin.scene));
+fn take_off(
+    removed: On<Remove, GeneratedSkin>,
+    mut commands: Commands,
+    skins: Res<GeneratedSkins>,
+    worn: Query<&Skin>,
+) {
+    let generated =
+        |skin: &Skin| skins.0.iter().any(|(_, p)| matches!(p, Progress::Made(scene) if *scene == skin.scene));
     if worn.get(removed.entity).is_ok_and(generated)
         && let Ok(mut ragdoll) = commands.get_entity(removed.entity)
     {
@@ -146,9 +155,9 @@ fn scene(
     let top = world.spawn((Name::new(skin.name.clone()), Transform::default())).id();
     let mut joints: Vec<Entity> = Vec::with_capacity(skin.skeleton.len());
     for joint in &skin.skeleton {
-        let (parent, from) = joint.parent.map_or((top, Vec3::ZERO), |parent| {
-            (joints[parent], Vec3::from_array(skin.skeleton[parent].position))
-        });
+        let (parent, from) = joint
+            .parent
+            .map_or((top, Vec3::ZERO), |parent| (joints[parent], Vec3::from_array(skin.skeleton[parent].position)));
         let place = Transform::from_translation(Vec3::from_array(joint.position) - from);
         joints.push(world.spawn((Name::new(joint.name.clone()), place, ChildOf(parent))).id());
     }

@@ -4,6 +4,7 @@
 mod blobs;
 mod body;
 mod camera;
+mod dust;
 mod effects;
 mod generated;
 mod ghost;
@@ -16,6 +17,7 @@ mod skin;
 
 pub use body::{LookPlugin, Tint, joint_places};
 pub use camera::{CameraMode, FollowCamera, FollowCameraPlugin};
+pub use dust::DustPlugin;
 pub use generated::{GeneratedSkin, GeneratedSkinPlugin, SkinGeneration};
 pub use ghost::{ErrorColors, Ghost, GhostPlugin, part_errors};
 pub use marks::{Marks, MarksPlugin, commanded_velocity};

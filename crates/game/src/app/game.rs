@@ -14,11 +14,12 @@ use crate::app::stage::recording::Recording;
 use crate::app::stage::scenario::Scenario;
 use crate::app::stage::skin::SkinChoice;
 use crate::app::ui::theme::Hud;
-use crate::app::{features, input, mode, notifications, pacing, stage, ui};
+use crate::app::{audio, features, input, mode, notifications, pacing, stage, ui};
 use bevy::prelude::*;
 use bevy_egui::EguiPlugin;
 use bevy_marathon::look::{
-    FollowCameraPlugin, GeneratedSkinPlugin, GhostPlugin, LookPlugin, MarksPlugin, Quality, SceneryPlugin, SkinPlugin,
+    DustPlugin, FollowCameraPlugin, GeneratedSkinPlugin, GhostPlugin, LookPlugin, MarksPlugin, Quality, SceneryPlugin,
+    SkinPlugin,
 };
 use bevy_marathon::{Ground, MarathonPlugin};
 use marathon_runs::{RunError, TaskConfig};
@@ -115,6 +116,7 @@ impl Plugin for GamePlugin {
             GhostPlugin,
             SkinPlugin,
             GeneratedSkinPlugin,
+            DustPlugin,
             SceneryPlugin(self.quality),
         ));
         app.add_plugins((
@@ -123,6 +125,7 @@ impl Plugin for GamePlugin {
             notifications::plugin,
             KeysPlugin,
             stage::plugin,
+            audio::plugin,
             input::plugin,
             ui::plugin,
             features::plugin,

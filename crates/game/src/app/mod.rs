@@ -1,8 +1,10 @@
 //! The `marathon-game` app: an app around the plugin.
 //!
-//! Read it from the bottom. `mode` has the states and the order of a frame, `stage` the characters, `input` the actions.
+//! Read it from the bottom. `mode` has the states and the order of a frame, `stage` the characters, `input` the actions, `audio`
+//! the sounds.
 //! `ui` has text and menu, `features` the modes. `cli` and `launch` start the app.
 
+mod audio;
 mod cli;
 mod display;
 mod error;
@@ -19,11 +21,15 @@ mod stage;
 mod ui;
 mod video;
 
+pub use audio::{PlaySound, RATE, Sound, Volumes};
 pub use cli::Args;
 pub use error::GameError;
 pub use features::course::leaderboard::{Course, KEPT, Place, ROWS, Run, Table};
 pub use features::course::{List, MOST_STEPS, Runs, Site, Step};
+pub use features::drag::Dragged;
+pub use features::film::{FilmProgram, FilmReel};
 pub use features::imitation::{GhostAt, Imitation, Reading};
+pub use features::limp::Limp;
 pub use features::perturb::{Ball, Perturbations};
 pub use features::remote::{Mailbox, RemotePose, RemoteSource};
 pub use features::replay::play::Playback;

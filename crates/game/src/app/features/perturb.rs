@@ -1,5 +1,6 @@
 //! Perturbations: pushes, balls, and other gravity and friction.
 
+use crate::app::audio::{PlaySound, Sound};
 use crate::app::input::actions::{Action, ActionPressed};
 use crate::app::input::pointer::{Gesture, Pointer};
 use crate::app::mode::{AppSet, Mode};
@@ -29,6 +30,10 @@ const BOUNCE: f32 = 0.55;
 const GRAVITY: f32 = 9.81;
 /// Steps of a ball per tick: at its speed it must not pass through an arm.
 const BALL_STEPS: u32 = 8;
+
+/// Speed of an impact from which on it is heard, and from which on it is loudest, m/s.
+const HEARD: f32 = 0.5;
+const LOUD: f32 = 8.0;
 
 /// The physics of all characters, as factors of the normal one, and the strength of pushes.
 #[derive(Resource, Clone, Copy, Debug, PartialEq)]
@@ -88,7 +93,16 @@ pub(super) fn plugin(app: &mut App) {
 
 pub(super) fn key_hints(hints: &mut KeyHints) {
     const KEYS: ModeKeys = ModeKeys {
-        useful: &[Action::Menu, Action::Push, Action::Throw, Action::Restart, Action::Camera, Action::Contacts],
+        useful: &[
+            Action::Menu,
+            Action::Push,
+            Action::Throw,
+            Action::Limp,
+            Action::Slower,
+            Action::Film,
+            Action::Restart,
+        ],
+        mouse: Some(["click: push, drag: pull", "click a limb: push it   drag a limb: pull it   wheel: closer"]),
         ..ModeKeys::COMMON
     };
     hints.add(|scenario| scenario.mode == Mode::Push, &KEYS);
@@ -180,6 +194,7 @@ fn throw(
     (mode, focus): (Res<State<Mode>>, Res<Focus>),
     mut meshes: Option<ResMut<Assets<Mesh>>>,
     mut materials: Option<ResMut<Assets<StandardMaterial>>>,
+    mut sounds: MessageWriter<PlaySound>,
 ) {
     for _ in actions.read().filter(|action| action.0 == Action::Throw && *mode != Mode::Course) {
         let Some((camera, at)) = camera.iter().next() else { continue };
@@ -196,6 +211,7 @@ fn throw(
         let seconds = (from.distance(there) / BALL_SPEED).max(1e-3);
         // aim higher from afar, so that the ball does not fall short
         let velocity = (there - from) / seconds + moving + Vec3::Y * (0.5 * GRAVITY * perturbations.gravity * seconds);
+        sounds.write(PlaySound { sound: Sound::Throw, at: Some(from), loudness: 0.7 });
         let mut ball = commands.spawn((
             Name::new("ball"),
             Ball { velocity, mass: perturbations.ball, left: BALL_LIFE },
@@ -218,7 +234,7 @@ fn fly(
     mut balls: Query<(Entity, &mut Ball, &mut Transform), Without<Part>>,
     marathon: Res<Marathon>,
     actors: Query<(Entity, &Anatomy, &RagdollState, &GlobalTransform, &Episode), With<Ragdoll>>,
-    mut pushes: MessageWriter<Push>,
+    (mut pushes, mut sounds): (MessageWriter<Push>, MessageWriter<PlaySound>),
 ) {
     if balls.is_empty() {
         return;
@@ -240,6 +256,7 @@ fn fly(
             ball.velocity.y -= GRAVITY * perturbations.gravity * dt;
             transform.translation += ball.velocity * dt;
             if transform.translation.y < BALL_RADIUS && ball.velocity.y < 0.0 {
+                sounds.write_batch(impact(transform.translation, -ball.velocity.y));
                 transform.translation.y = BALL_RADIUS;
                 ball.velocity.y *= -BOUNCE;
                 ball.velocity *= Vec3::new(0.96, 1.0, 0.96);
@@ -257,6 +274,7 @@ fn fly(
                 if closing >= 0.0 {
                     continue;
                 }
+                sounds.write_batch(impact(transform.translation, -closing));
                 // the resistance of the body to a blow, as the contact solver has it
                 let lightness = anatomy.model.bodies[rod.body].invweight0[0] as f32;
                 let impulse = -(1.0 + BOUNCE) * closing / (1.0 / ball.mass + lightness);
@@ -269,6 +287,12 @@ fn fly(
             }
         }
     }
+}
+
+/// The sound of a ball that hits something at a speed, m/s.
+fn impact(at: Vec3, speed: f32) -> Option<PlaySound> {
+    let loudness = (speed / LOUD).powf(1.5).min(1.0);
+    (speed > HEARD).then_some(PlaySound { sound: Sound::Impact, at: Some(at), loudness })
 }
 
 /// Draws the sliders.

@@ -12,6 +12,7 @@ use bevy_marathon::Anatomy;
 use bevy_marathon::look::{Dressed, GeneratedSkin, Skin, SkinError, SkinGeneration, UnfitSkin};
 use marathon_physics::budget;
 use serde_json::Value;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 /// The skin that comes with Marathon, its name, and the model that it is made for.
@@ -51,10 +52,24 @@ impl SkinChoice {
             _ => return SkinFile::read(path, mapping).map(SkinChoice::File),
         };
         if mapping.is_some() {
-            let problem = format!("--mapping goes with a file, found --skin {}; expected --skin FILE.glb", path.display());
+            let problem =
+                format!("--mapping goes with a file, found --skin {}; expected --skin FILE.glb", path.display());
             return Err(GameError::System(problem));
         }
         Ok(choice)
+    }
+
+    /// The words of a command line that make this choice.
+    pub fn words(&self) -> Vec<OsString> {
+        match self {
+            SkinChoice::Fitting => Vec::new(),
+            SkinChoice::Bare => vec!["--skin".into(), BARE.into()],
+            SkinChoice::Generated => vec!["--skin".into(), GENERATED.into()],
+            SkinChoice::File(SkinFile { path, mapping, .. }) => {
+                let mapping = mapping.iter().flat_map(|mapping| ["--mapping".into(), mapping.path.clone().into()]);
+                ["--skin".into(), path.clone().into()].into_iter().chain(mapping).collect()
+            }
+        }
     }
 
     /// What a character wears in a mode.
@@ -242,10 +257,7 @@ fn report(
     choice: Res<SkinChoice>,
     mut state: ResMut<SkinState>,
     mut notes: ResMut<Notifications>,
-    waiting: Query<
-        (),
-        (With<Actor>, Or<(With<Skin>, With<GeneratedSkin>)>, Without<Dressed>, Without<UnfitSkin>),
-    >,
+    waiting: Query<(), (With<Actor>, Or<(With<Skin>, With<GeneratedSkin>)>, Without<Dressed>, Without<UnfitSkin>)>,
     unfit: Query<Ref<UnfitSkin>, With<Actor>>,
 ) {
     let refused = unfit.iter().next();
