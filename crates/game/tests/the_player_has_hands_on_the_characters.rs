@@ -1,4 +1,4 @@
-//! What a player does to characters besides steering: drag a limb, make one limp, keep the last seconds as a film. And what is heard.
+//! The player drags a limb, makes a character limp, and keeps the last seconds as a film. Steps, balls and falls are heard.
 
 #[path = "common/windowless.rs"]
 mod windowless;
@@ -16,7 +16,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use windowless::frames;
 
-/// What has been heard.
+/// The sounds of the test so far.
 #[derive(Resource, Default)]
 struct Heard(Vec<PlaySound>);
 

@@ -35,7 +35,7 @@ pub(super) fn plugin(app: &mut App) {
         .add_systems(PostUpdate, place.run_if(resource_exists::<Discs>).before(TransformSystems::Propagate));
 }
 
-/// What discs are made of.
+/// Mesh and materials of the discs.
 #[derive(Resource)]
 struct Discs {
     mesh: Handle<Mesh>,

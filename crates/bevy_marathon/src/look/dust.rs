@@ -33,11 +33,11 @@ impl Plugin for DustPlugin {
     fn build(&self, app: &mut App) {
         app.add_systems(Startup, make)
             .add_systems(Update, (raise, drift).chain().run_if(resource_exists::<Puffs>))
-            .add_systems(Update, settle.run_if(resource_changed::<Quality>).after(drift));
+            .add_systems(Update, settle.run_if(resource_exists_and_changed::<Quality>).after(drift));
     }
 }
 
-/// What puffs are made of, and the next one to be used again.
+/// Mesh and materials of the puffs, and the next puff to be used again.
 #[derive(Resource)]
 struct Puffs {
     mesh: Handle<Mesh>,

@@ -19,7 +19,7 @@ const QUIET: f32 = 0.25;
 /// Distance before the end of a course from which on it counts as run, m.
 const FINISH: f64 = 2.0;
 
-/// What has been heard of a character.
+/// The latest sounds of a character.
 #[derive(Component, Clone, Copy, Debug, Default)]
 struct Heard {
     /// Time of the last step.
@@ -99,7 +99,7 @@ fn hear_falls(
     }
 }
 
-/// The crowd cheers whoever reaches the end of a course.
+/// The crowd cheers when a character reaches the end of a course.
 fn hear_finish(mode: Res<State<Mode>>, mut ended: MessageReader<EpisodeEnded>, mut sounds: MessageWriter<PlaySound>) {
     let through = ended.read().filter(|e| *mode == Mode::Course && e.episode.farthest > TO - FINISH).count();
     if through > 0 {

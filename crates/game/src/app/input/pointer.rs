@@ -15,7 +15,7 @@ const LONG: f32 = 0.25;
 pub struct Pointer {
     /// The cursor, points of the window, if it is in the window.
     pub cursor: Option<Vec2>,
-    /// What the left button does in this frame.
+    /// The use of the left button in this frame.
     pub gesture: Gesture,
 }
 

@@ -24,7 +24,7 @@ const GENERATED: &str = "generated";
 /// The first bytes of a .glb file.
 const MAGIC: &[u8] = b"glTF";
 
-/// What the characters wear. It may change at any time.
+/// The choice of the characters' skins. It may change at any time.
 #[derive(Resource, Clone, Default)]
 pub enum SkinChoice {
     /// Marathon Man wears his own skin, other characters a generated one. Bare shapes are what the test bed shows, and what
@@ -72,7 +72,7 @@ impl SkinChoice {
         }
     }
 
-    /// What a character wears in a mode.
+    /// The skin of a character in a mode.
     fn of(&self, mode: Mode, anatomy: &Anatomy) -> Wear<'_> {
         match self {
             SkinChoice::Bare => Wear::Nothing,
@@ -85,7 +85,7 @@ impl SkinChoice {
     }
 }
 
-/// What a character wears. A file is that of the user, or the shipped one.
+/// The skin of a character. A file is that of the user, or the shipped one.
 enum Wear<'a> {
     Nothing,
     Generated,

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 /// A recording of running characters.
 pub struct Tape {
-    /// What has been recorded.
+    /// The recorded decisions.
     pub recording: Recording,
     /// Time of the newest frame.
     until: Duration,
