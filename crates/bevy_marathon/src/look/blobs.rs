@@ -13,7 +13,7 @@ use marathon_physics::Model;
 use marathon_physics::model::{Geom, GeomType};
 
 /// Darkness below a body that touches the ground.
-const DARKEST: f32 = 0.55;
+const DARKEST: f32 = 0.75;
 /// Height at which a disc is half as dark, m.
 const HALF_HEIGHT: f32 = 0.35;
 /// Growth of a disc's radius with the height of its body.
