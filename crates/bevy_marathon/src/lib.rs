@@ -95,8 +95,8 @@ pub use strength::LimbStrength;
 pub mod prelude {
     #[cfg(feature = "render")]
     pub use crate::look::{
-        ErrorColors, FollowCamera, FollowCameraPlugin, FootLock, Ghost, GhostPlugin, LookPlugin, Marks, MarksPlugin,
-        Quality, SceneryPlugin, Skin, SkinPlugin, Tint,
+        DustPlugin, ErrorColors, FollowCamera, FollowCameraPlugin, FootLock, GeneratedSkin, GeneratedSkinPlugin, Ghost,
+        GhostPlugin, LookPlugin, Marks, MarksPlugin, Quality, SceneryPlugin, Skin, SkinPlugin, Tint,
     };
     pub use crate::messages::*;
     pub use crate::plugin::{MarathonPlugin, MarathonSystems};

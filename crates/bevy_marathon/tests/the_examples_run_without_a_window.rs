@@ -1,4 +1,5 @@
-//! The examples run in an app without a window and without a graphics card, and the first program of the README is as short as it says.
+//! The examples and the looks run in an app without a window and without a graphics card, and the first program of the README is as
+//! short as it says.
 #![cfg(feature = "window")]
 
 #[allow(dead_code, reason = "its window stays closed")]
@@ -33,6 +34,8 @@ use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
 use bevy_marathon::look::{Dressed, UnfitSkin};
 use bevy_marathon::prelude::*;
+use marathon_physics::Model;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Bevy's default plugins and those of an example, after the start.
@@ -97,6 +100,73 @@ fn the_figure_is_worn() {
     });
     let refused = app.world_mut().query::<&UnfitSkin>().iter(app.world()).next();
     assert!(refused.is_none(), "{refused:?}");
+}
+
+const ROBOT: &str = "<mujoco model='robot'><worldbody><geom type='plane' size='5 5 1'/><body name='trunk' pos='0 0 1'><freejoint/>\
+    <geom type='box' size='.1 .2 .3' mass='3'/><body name='arm' pos='0 .25 .2'><joint axis='1 0 0'/>\
+    <geom type='capsule' fromto='0 0 0 0 .4 0' size='.05'/></body></body></worldbody></mujoco>";
+const MESHLESS: &str = "<mujoco model='nothing'><worldbody><body name='dot'><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>\
+    <joint axis='0 1 0'/></body></worldbody></mujoco>";
+
+/// Looks of characters whose models are read here.
+fn models(app: &mut App, quality: Quality) {
+    app.add_plugins((MarathonPlugin, LookPlugin, SkinPlugin, GeneratedSkinPlugin, SceneryPlugin(quality)));
+}
+
+fn spawn(world: &mut World, xml: &str) -> Entity {
+    let model = Arc::new(Model::from_xml_str(xml, "model.xml").expect("it is a model"));
+    let prefab = world.resource_mut::<Assets<RagdollPrefab>>().add(RagdollPrefab { model });
+    world.spawn((Ragdoll::prefab(prefab), GeneratedSkin)).id()
+}
+
+#[test]
+fn a_skin_is_generated_for_a_model_of_your_own() {
+    let mut app = windowless(|app: &mut App| models(app, Quality::Medium));
+    let robots = [0; 2].map(|_| spawn(app.world_mut(), ROBOT));
+    let bare = spawn(app.world_mut(), MESHLESS);
+    run_until(&mut app, "two robots in a skin, and a model without one", |world| {
+        let dressed = robots.iter().all(|robot| world.get::<Dressed>(*robot).is_some());
+        dressed && world.get::<UnfitSkin>(bare).is_some()
+    });
+    let worn = |app: &App, robot| app.world().get::<Skin>(robot).map(|skin| skin.scene.clone());
+    // both models are equal, though they were read twice
+    assert!(worn(&app, robots[0]).is_some() && worn(&app, robots[0]) == worn(&app, robots[1]));
+    let mut arms = app.world_mut().query::<(&Name, &GlobalTransform, Has<Part>)>();
+    let places: Vec<_> = arms.iter(app.world()).filter(|(name, ..)| name.as_str() == "arm").collect();
+    let at = |part: bool| places.iter().filter(|(.., is)| *is == part).map(|(_, at, _)| at.translation()).next();
+    let (bone, body) = (at(false).expect("a bone"), at(true).expect("a body"));
+    assert!(bone.distance(body) < 0.02, "the arm of the skin is at {bone}, that of the physics at {body}");
+    app.world_mut().entity_mut(robots[0]).remove::<GeneratedSkin>();
+    app.update();
+    assert!(worn(&app, robots[0]).is_none(), "it is taken off");
+    assert!(worn(&app, robots[1]).is_some(), "the other one keeps it");
+}
+
+#[test]
+fn discs_below_the_bodies_take_the_place_of_shadows_at_low_quality() {
+    let mut app = windowless(|app: &mut App| models(app, Quality::Low));
+    spawn(app.world_mut(), ROBOT);
+    // above the ground, then fallen onto it
+    let discs = |app: &mut App| {
+        let mut named = app.world_mut().query::<(&Name, &GlobalTransform)>();
+        let discs = named.iter(app.world()).filter(|(name, _)| name.as_str() == "blob shadow");
+        discs.map(|(_, at)| (at.translation().y, at.compute_transform().scale.x)).collect::<Vec<_>>()
+    };
+    for _ in 0..4 {
+        app.update();
+    }
+    let high = discs(&mut app);
+    assert_eq!(high.len(), 2, "one for each body");
+    for _ in 0..150 {
+        app.update();
+    }
+    let low = discs(&mut app);
+    assert!(high.iter().chain(&low).all(|(y, _)| (0.0..0.05).contains(y)), "on the ground: {high:?} {low:?}");
+    assert!(low[0].1 < high[0].1, "smaller when the body is near: {high:?} {low:?}");
+    app.insert_resource(Quality::Medium);
+    app.update();
+    app.update();
+    assert!(discs(&mut app).is_empty());
 }
 
 #[test]

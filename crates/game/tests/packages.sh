@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs the Debian packages that the game is made, run and tested with, where one may; says which are missing otherwise.
 set -euo pipefail
-packages=(pkg-config libudev-dev libvulkan1 mesa-vulkan-drivers libxkbcommon-x11-0 libx11-xcb1 libxcursor1 libxi6 libxrandr2
+packages=(pkg-config libudev-dev libasound2-dev libvulkan1 mesa-vulkan-drivers libxkbcommon-x11-0 libx11-xcb1 libxcursor1 libxi6 libxrandr2
   xvfb xdotool imagemagick ffmpeg)
 if ! command -v dpkg > /dev/null; then
   echo "the game needs what Debian calls: ${packages[*]}; ./test.sh without --all leaves the game out" >&2

@@ -117,11 +117,12 @@ fn a_ghost_errors_and_a_skin_are_drawn() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     let words = ["MarathonManWalk", "--mode", "imitate", "--no-hud", "--option", "start=first"];
     let draw = |name: &str, more: &[&str]| draw(folder.path(), name, &[&words[..], more].concat());
+    // the errors are colors of the shapes, with or without a skin
     let off = ["--action", "0:ghost", "--action", "0:ghost"];
-    let plain = draw("man.png", &[&off[..], &["--action", "0:errors"]].concat())?;
-    let beside = draw("man-ghost.png", &["--action", "0:ghost", "--action", "0:errors"])?;
+    let plain = draw("man.png", &[&off[..], &["--action", "0:errors", "--skin", "none"]].concat())?;
+    let beside = draw("man-ghost.png", &["--action", "0:ghost", "--action", "0:errors", "--skin", "none"])?;
     let errors = draw("man-errors.png", &off)?;
-    let skin = draw("man-skin.png", &[&off[..], &["--action", "0:errors", "--skin", "marathon_man"]].concat())?;
+    let skin = draw("man-skin.png", &[&off[..], &["--action", "0:errors"]].concat())?;
     for (what, image) in [("the ghost", &beside), ("errors", &errors), ("the skin", &skin)] {
         let share = differing(&plain, image);
         assert!((0.001..0.2).contains(&share), "{what}: {share} of the numbers differ");
@@ -173,7 +174,7 @@ fn what_is_wrong_is_told() -> Result<(), Box<dyn Error>> {
         folder.path().join("wrong.json"),
         r#"{"mapping": 1, "model": "hero", "hips": ["a", "b"], "parts": {}}"#,
     )?;
-    let cases: [(&[&str], i32, &[&str]); 24] = [
+    let cases: [(&[&str], i32, &[&str]); 25] = [
         (&["hoper"], 1, &["'hoper' does not exist", "did you mean 'Hopper-v0'"]),
         (&["runs/hopper-1"], 1, &["runs/hopper-1", "no such file"]),
         (&["broken.safetensor"], 1, &["did you mean", "broken.safetensors"]),
@@ -204,6 +205,7 @@ fn what_is_wrong_is_told() -> Result<(), Box<dyn Error>> {
         ),
         (&["MarathonMan", "--skin", "marathon_man", "--mapping", "rong.json"], 1, &["did you mean", "wrong.json"]),
         (&["MarathonMan", "--mapping", "wrong.json"], 2, &["--skin"]),
+        (&["MarathonMan", "--skin", "none", "--mapping", "wrong.json"], 1, &["--skin none", "--skin FILE.glb"]),
         (&["\u{1b}[31mhopper"], 1, &["\\u{1b}[31mhopper"]),
         (&["MarathonMan", "--skin", "half.glb", "--record", "a.png"], 1, &["half.glb cannot be worn"]),
         (

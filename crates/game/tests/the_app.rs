@@ -8,11 +8,11 @@ use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::prelude::*;
 use bevy::window::FileDragAndDrop;
 use bevy_marathon::axes::to_game;
-use bevy_marathon::look::{CameraMode, part_errors};
+use bevy_marathon::look::{CameraMode, Dressed, part_errors};
 use bevy_marathon::prelude::*;
 use marathon_game::app::{
     Action, Actor, Ball, Bindings, Focus, Mode, Notifications, Playback, Reading, Recorder, Recording, Scenario,
-    SkinState, TrainingRun, WornSkin,
+    SkinChoice, SkinState, TrainingRun,
 };
 use marathon_render::Scene;
 use std::path::Path;
@@ -433,16 +433,55 @@ fn a_dropped_clip_is_followed_and_a_bad_file_changes_nothing() -> Result<(), Box
     Ok(())
 }
 
+/// Runs frames until the skins are worn.
+fn dress(app: &mut App) {
+    let begun = Instant::now();
+    while *app.world().resource::<SkinState>() == SkinState::Waiting {
+        frames(app, 1);
+        std::thread::sleep(Duration::from_millis(5));
+        assert!(begun.elapsed() < Duration::from_secs(60), "it is still being made");
+    }
+    assert_eq!(*app.world().resource::<SkinState>(), SkinState::Worn);
+}
+
+/// Whether the characters wear the skin of a file, a generated one, and how many wear one at all.
+fn worn(app: &mut App) -> [usize; 3] {
+    let world = app.world_mut();
+    let file = world.query_filtered::<(), (With<Skin>, Without<GeneratedSkin>)>().iter(world).count();
+    let generated = world.query_filtered::<(), (With<Skin>, With<GeneratedSkin>)>().iter(world).count();
+    [file, generated, world.query_filtered::<(), With<Dressed>>().iter(world).count()]
+}
+
+#[test]
+fn characters_wear_skins_that_fit_them_unless_the_user_chooses() {
+    let mut app = app(&["hopper", "--agents", "2"]);
+    dress(&mut app);
+    assert_eq!(worn(&mut app), [0, 2, 2], "both share a generated skin");
+    let mut skins = app.world_mut().query::<&Skin>();
+    let scenes: Vec<_> = skins.iter(app.world()).map(|skin| skin.scene.clone()).collect();
+    assert_eq!(scenes[0], scenes[1]);
+    app.insert_resource(SkinChoice::Bare);
+    frames(&mut app, 2);
+    assert_eq!(worn(&mut app), [0; 3]);
+    let mut shapes = app.world_mut().query_filtered::<&Visibility, With<Mesh3d>>();
+    assert!(shapes.iter(app.world()).any(|visibility| *visibility == Visibility::Inherited), "the shapes are back");
+
+    app.insert_resource(SkinChoice::Fitting);
+    windowless::load(&mut app, |scenario| scenario.mode = Mode::Testbed);
+    frames(&mut app, 4);
+    assert_eq!(worn(&mut app), [0; 3], "the test bed shows the shapes of the physics");
+    windowless::load(&mut app, |scenario| {
+        (scenario.mode, scenario.agent, scenario.agents) = (Mode::Watch, "MarathonManWalk-v0".into(), 1);
+    });
+    frames(&mut app, 4);
+    dress(&mut app);
+    assert_eq!(worn(&mut app), [1, 0, 1], "Marathon Man has a skin of his own");
+}
+
 #[test]
 fn a_skin_follows_the_body() -> Result<(), Box<dyn std::error::Error>> {
-    let mut app = app(&["MarathonManWalk", "--skin", "marathon_man"]);
-    let begun = Instant::now();
-    while app.world().resource::<WornSkin>().state == SkinState::Waiting {
-        frames(&mut app, 1);
-        std::thread::sleep(Duration::from_millis(5));
-        assert!(begun.elapsed() < Duration::from_secs(60), "it is still being read");
-    }
-    assert_eq!(app.world().resource::<WornSkin>().state, SkinState::Worn);
+    let mut app = app(&["MarathonManWalk"]);
+    dress(&mut app);
     let mut names = app.world_mut().query::<(&Name, &GlobalTransform)>();
     let mut anatomies = app.world_mut().query_filtered::<&Anatomy, With<Actor>>();
     for _ in 0..3 {

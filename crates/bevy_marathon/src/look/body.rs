@@ -23,6 +23,14 @@ const METAL: [f32; 3] = [0.20, 0.21, 0.24];
 const RUBBER: [f32; 3] = [0.11, 0.12, 0.14];
 /// Height of the sides of a height field, m.
 const SIDE: f32 = 0.5;
+/// Bend of the ground at a point from which on it is the edge of a step, m.
+const EDGE: f32 = 0.018;
+/// Brightness of such edges and of steep sides.
+const DARKEST: f32 = 0.38;
+/// Loss of brightness per meter that the ground around a point is higher.
+const HOLLOW: f32 = 4.0;
+/// Points on each side that count as around a point.
+const AROUND: usize = 3;
 /// Things that belong to the world, sRGB.
 const WORLD: [f32; 3] = [0.62, 0.60, 0.56];
 
@@ -309,6 +317,9 @@ fn terrain(field: &HField, own: Option<&[f32]>, place: Vec3) -> Mesh {
             to_game([along(c, columns, half_x), along(r, rows, half_y), z])
         })
         .collect();
+    let heights: Vec<f32> = positions.iter().map(|p| p.y).collect();
+    let mut shades: Vec<[f32; 4]> =
+        (0..heights.len()).map(|i| shade(&heights, [rows, columns], [i / columns, i % columns])).collect();
     let checker: Vec<Vec2> = positions.iter().map(|p| (*p + place).xz() / ground::PERIOD).collect();
     let mut triangles = Vec::new();
     for r in 1..rows as u32 {
@@ -327,6 +338,7 @@ fn terrain(field: &HField, own: Option<&[f32]>, place: Vec3) -> Mesh {
             for depth in [0.0, SIDE] {
                 positions.push(positions[at] - Vec3::Y * depth);
                 checker.push(checker[at] + Vec2::Y * (depth / ground::PERIOD));
+                shades.push(gray(DARKEST));
             }
         }
         for column in 1..columns as u32 {
@@ -339,7 +351,37 @@ fn terrain(field: &HField, own: Option<&[f32]>, place: Vec3) -> Mesh {
     Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
         .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions)
         .with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, checker)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_COLOR, shades)
         .with_inserted_indices(Indices::U32(triangles))
         .with_duplicated_vertices()
         .with_computed_flat_normals()
+}
+
+/// Brightness of a point of a height field: dark at the edges of steps and ditches, and where the ground around it is higher.
+fn shade(heights: &[f32], [rows, columns]: [usize; 2], [row, column]: [usize; 2]) -> [f32; 4] {
+    let at = |r: usize, c: usize| heights[r * columns + c];
+    let here = at(row, column);
+    // the bend between both neighbors, which an even slope lacks
+    let bend = |before: Option<f32>, after: Option<f32>| match (before, after) {
+        (Some(before), Some(after)) => (before - 2.0 * here + after).abs(),
+        _ => 0.0,
+    };
+    let up = |i: usize, n: usize| (i + 1 < n).then_some(i + 1);
+    let along = bend(column.checked_sub(1).map(|c| at(row, c)), up(column, columns).map(|c| at(row, c)));
+    let across = bend(row.checked_sub(1).map(|r| at(r, column)), up(row, rows).map(|r| at(r, column)));
+    if along.max(across) >= EDGE {
+        return gray(DARKEST);
+    }
+    let (mut above, mut count) = (0.0, 0.0_f32);
+    for r in row.saturating_sub(AROUND)..(row + AROUND + 1).min(rows) {
+        for c in column.saturating_sub(AROUND)..(column + AROUND + 1).min(columns) {
+            above += (at(r, c) - here).max(0.0);
+            count += 1.0;
+        }
+    }
+    gray((1.0 - HOLLOW * above / count.max(1.0)).max(DARKEST))
+}
+
+fn gray(x: f32) -> [f32; 4] {
+    [x, x, x, 1.0]
 }

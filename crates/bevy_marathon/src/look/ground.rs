@@ -1,4 +1,4 @@
-//! The checker on the ground: one-meter cells whose flow reads as speed, with a line every eight.
+//! The checker on the ground: one-meter cells whose flow reads as speed, with a tick at every corner and a line every eight.
 
 use bevy::asset::RenderAssetUsages;
 use bevy::image::{ImageAddressMode, ImageFilterMode, ImageSampler, ImageSamplerDescriptor};
@@ -10,11 +10,14 @@ use bevy::render::renderer::RenderAdapterInfo;
 pub const PERIOD: f32 = 8.0;
 /// Pixels along its side.
 const SIDE: usize = 1024;
-/// The two tones, and the lines; sRGB.
-const TONES: [[u8; 3]; 2] = [[96, 108, 122], [120, 133, 147]];
-const LINE: [u8; 3] = [226, 232, 236];
+/// The two tones of warm stone, the ticks, and the lines; sRGB. They are darker and less saturated than characters are.
+const TONES: [[u8; 3]; 2] = [[122, 114, 103], [143, 135, 123]];
+const TICK: [u8; 3] = [176, 167, 152];
+const LINE: [u8; 3] = [236, 231, 220];
 /// Width of the line every eight meters, pixels; it is split over both edges of the texture.
 const LINE_WIDTH: usize = 6;
+/// Length and width of the arms of a tick, which marks a corner of four cells, pixels.
+const TICK_SIZE: [usize; 2] = [10, 2];
 
 /// Samples along the direction in which a texture is squeezed. A processor takes seconds for a frame with more than one.
 pub fn anisotropy(adapter: Option<&RenderAdapterInfo>) -> u16 {
@@ -28,7 +31,14 @@ pub fn checker(anisotropy: u16) -> Image {
         .map(|i| {
             let (x, y) = (i % SIDE, i / SIDE);
             let edge = |v: usize| !(LINE_WIDTH / 2..SIDE - LINE_WIDTH / 2).contains(&v);
-            if edge(x) || edge(y) { LINE } else { TONES[(x / cell + y / cell) % 2] }
+            // distance from the next line between cells
+            let [u, v] = [x, y].map(|v| (v % cell).min(cell - 1 - v % cell));
+            let tick = u.max(v) < TICK_SIZE[0] && u.min(v) < TICK_SIZE[1];
+            match () {
+                () if edge(x) || edge(y) => LINE,
+                () if tick => TICK,
+                () => TONES[(x / cell + y / cell) % 2],
+            }
         })
         .collect();
     let mut side = SIDE;

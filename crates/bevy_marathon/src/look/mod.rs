@@ -1,9 +1,13 @@
 //! Appearance of ragdolls and their world: meshes and materials, ground, sky and sun, a camera that follows, marks for
 //! contacts and joints. Every part is a separate plugin; add those that your game lacks.
 
+mod blobs;
 mod body;
 mod camera;
+mod dust;
+mod effects;
 mod foot_lock;
+mod generated;
 mod ghost;
 mod ground;
 mod marks;
@@ -16,7 +20,9 @@ mod skin;
 
 pub use body::{LookPlugin, Tint, joint_places};
 pub use camera::{CameraMode, FollowCamera, FollowCameraPlugin};
+pub use dust::DustPlugin;
 pub use foot_lock::FootLock;
+pub use generated::{GeneratedSkin, GeneratedSkinPlugin, SkinGeneration};
 pub use ghost::{ErrorColors, Ghost, GhostPlugin, part_errors};
 pub use marks::{Marks, MarksPlugin, commanded_velocity};
 pub use quality::Quality;

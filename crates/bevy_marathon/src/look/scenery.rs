@@ -1,7 +1,7 @@
 //! Ground, sky and sun.
 
 use crate::look::quality::{HORIZON, Quality};
-use crate::look::{FollowCamera, ground, meters};
+use crate::look::{FollowCamera, blobs, effects, ground, meters};
 use crate::ragdoll::Anatomy;
 use bevy::asset::RenderAssetUsages;
 use bevy::light::{
@@ -18,6 +18,10 @@ use std::f32::consts::PI;
 const ZENITH: [f32; 3] = [0.25, 0.48, 0.78];
 /// Where the sun stands.
 const SUN: Vec3 = Vec3::new(-0.45, 0.80, 0.55);
+/// Where the light comes from that draws an edge around characters, opposite to the sun.
+const RIM: Vec3 = Vec3::new(0.6, 0.35, -0.7);
+/// Illuminance of the sun, and of that light, lux.
+const ILLUMINANCE: [f32; 2] = [8_500.0, 2_400.0];
 /// Half the side of the ground, m; it follows the camera.
 const REACH: f32 = 320.0;
 /// Depth of the ground below figures that run on height fields alone, m: more than a course goes down.
@@ -31,8 +35,10 @@ pub struct SceneryPlugin(pub Quality);
 
 impl Plugin for SceneryPlugin {
     fn build(&self, app: &mut App) {
+        app.insert_resource(self.0);
+        effects::plugin(app);
+        blobs::plugin(app);
         app.register_type::<Quality>()
-            .insert_resource(self.0)
             .insert_resource(ClearColor(Color::srgb_from_array(HORIZON)))
             .insert_resource(shadow_map(self.0))
             .insert_resource(GlobalAmbientLight { color: Color::srgb(0.75, 0.85, 1.0), brightness: 420.0, ..default() })
@@ -50,6 +56,10 @@ struct Around {
     /// Far below figures that have no level floor.
     floor: bool,
 }
+
+/// The light that casts shadows.
+#[derive(Component)]
+struct Sun;
 
 fn build(
     mut commands: Commands,
@@ -88,12 +98,19 @@ fn build(
         Name::new("sun"),
         DirectionalLight {
             color: Color::srgb(1.0, 0.96, 0.88),
-            illuminance: 8_500.0,
+            illuminance: ILLUMINANCE[0],
             shadow_maps_enabled: *quality != Quality::Low,
+            contact_shadows_enabled: *quality == Quality::High,
             ..default()
         },
+        Sun,
         shadows(*quality),
         Transform::from_translation(SUN).looking_at(Vec3::ZERO, Vec3::Y),
+    ));
+    commands.spawn((
+        Name::new("rim light"),
+        DirectionalLight { color: Color::srgb(0.80, 0.88, 1.0), illuminance: ILLUMINANCE[1], ..default() },
+        Transform::from_translation(RIM).looking_at(Vec3::ZERO, Vec3::Y),
     ));
 }
 
@@ -116,12 +133,13 @@ fn shadow_map(quality: Quality) -> DirectionalLightShadowMap {
 fn requality(
     quality: Res<Quality>,
     mut map: ResMut<DirectionalLightShadowMap>,
-    mut suns: Query<(&mut DirectionalLight, &mut CascadeShadowConfig)>,
+    mut suns: Query<(&mut DirectionalLight, &mut CascadeShadowConfig), With<Sun>>,
     mut cameras: Query<&mut Msaa, With<FollowCamera>>,
 ) {
     *map = shadow_map(*quality);
     for (mut sun, mut config) in &mut suns {
         sun.shadow_maps_enabled = *quality != Quality::Low;
+        sun.contact_shadows_enabled = *quality == Quality::High;
         *config = shadows(*quality);
     }
     cameras.iter_mut().for_each(|mut msaa| *msaa = quality.msaa());

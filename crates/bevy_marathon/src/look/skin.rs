@@ -80,6 +80,9 @@ pub enum SkinError {
     /// The skin brings no mapping, and the one that comes with Marathon does not know its bones.
     #[error("{0}; rename its bones, as Mixamo or Blender's Rigify calls them, or write a mapping that names them")]
     UnknownBones(MotionError),
+    /// No skin can be generated for the model.
+    #[error(transparent)]
+    Generate(marathon_skin::SkinError),
 }
 
 /// On a ragdoll: it wears its [`Skin`].

@@ -24,7 +24,7 @@ pub fn run(args: &PlayArgs) -> Result<(), CliError> {
         return Err(CliError::Game(format!(
             "the game is not built: '{GAME}' is neither beside this program nor on the search path.\n\
              In the project's folder: cargo build --release -p {GAME}   (about 15 minutes on two cores, once)\n\
-             Debian and Ubuntu need beforehand: apt install pkg-config libudev-dev\n\
+             Debian and Ubuntu need beforehand: apt install pkg-config libudev-dev libasound2-dev\n\
              and to show a window: libvulkan1 mesa-vulkan-drivers libxkbcommon-x11-0 libx11-xcb1 libxcursor1 libxi6 \
              libxrandr2\n\
              Without it, `marathon render` draws policies."

@@ -36,7 +36,7 @@ Examples:
   marathon-game --mode course --role build       you build the ground ahead of it, with the mouse
   marathon-game --mode testbed my-robot.xml      a slider per motor
   marathon-game ant --ground stairs              or hills, or boards
-  marathon-game MarathonManRun --skin marathon_man   with the skin of a person; or with that of hero.glb
+  marathon-game MarathonManRun --skin hero.glb   in the skin of a glTF character; --skin none shows the shapes
   marathon-game hopper --record hop.mp4          a video, without a window (needs ffmpeg)
   marathon-game hopper --mode push --action 1.5:throw --record ball.mp4   the same with a ball thrown at it
   marathon-game --replay run.replay              what R recorded, with a time line
@@ -74,7 +74,8 @@ pub struct Args {
     /// Recording to replay; the key R makes one.
     #[arg(long, value_name = "FILE")]
     pub replay: Option<PathBuf>,
-    /// Skin of the characters: a .glb file with a skeleton, or marathon_man, which comes with Marathon.
+    /// Skin of the characters: a .glb file with a skeleton, marathon_man, which comes with Marathon, generated for one made from
+    /// the model, or none for bare shapes [default: marathon_man for Marathon Man, else generated; none in the test bed].
     #[arg(long, value_name = "FILE")]
     pub skin: Option<PathBuf>,
     /// Mapping from bones to bodies, for a skeleton with unknown names [default: the mapping that comes with Marathon for the

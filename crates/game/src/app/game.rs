@@ -12,13 +12,14 @@ use crate::app::stage::actors::ShownMarks;
 use crate::app::stage::policies::ShippedPolicies;
 use crate::app::stage::recording::Recording;
 use crate::app::stage::scenario::Scenario;
-use crate::app::stage::skin::SkinFile;
+use crate::app::stage::skin::SkinChoice;
 use crate::app::ui::theme::Hud;
-use crate::app::{features, input, mode, notifications, pacing, stage, ui};
+use crate::app::{audio, features, input, mode, notifications, pacing, stage, ui};
 use bevy::prelude::*;
 use bevy_egui::EguiPlugin;
 use bevy_marathon::look::{
-    FollowCameraPlugin, GhostPlugin, LookPlugin, MarksPlugin, Quality, SceneryPlugin, SkinPlugin,
+    DustPlugin, FollowCameraPlugin, GeneratedSkinPlugin, GhostPlugin, LookPlugin, MarksPlugin, Quality, SceneryPlugin,
+    SkinPlugin,
 };
 use bevy_marathon::{Ground, MarathonPlugin};
 use marathon_runs::{RunError, TaskConfig};
@@ -29,7 +30,7 @@ pub struct GamePlugin {
     scenario: Scenario,
     shipped: ShippedPolicies,
     playback: Option<Playback>,
-    skin: Option<SkinFile>,
+    skin: SkinChoice,
     quality: Quality,
 }
 
@@ -63,7 +64,7 @@ impl GamePlugin {
         if args.mlagents_port.is_some() || args.watch_stream {
             scenario.mode = Mode::Outside;
         }
-        let skin = args.skin.as_deref().map(|skin| SkinFile::read(skin, args.mapping.as_deref())).transpose()?;
+        let skin = SkinChoice::read(args.skin.as_deref(), args.mapping.as_deref())?;
         Ok(GamePlugin { args: args.clone(), scenario, shipped, playback, skin, quality: args.quality() })
     }
 
@@ -96,10 +97,8 @@ impl GamePlugin {
             .insert_resource(args.mappings())
             .insert_resource(ScriptedActions::new(args.action.clone()))
             .insert_resource(ScriptedInputs::new(&args.input))
+            .insert_resource(self.skin.clone())
             .insert_resource(Runs::new(args.table.clone(), args.player.clone()));
-        if let Some(skin) = self.skin.clone() {
-            app.insert_resource(skin);
-        }
         if let Some(playback) = self.playback.clone() {
             app.insert_resource(playback);
         }
@@ -117,6 +116,8 @@ impl Plugin for GamePlugin {
             MarksPlugin,
             GhostPlugin,
             SkinPlugin,
+            GeneratedSkinPlugin,
+            DustPlugin,
             SceneryPlugin(self.quality),
         ));
         app.add_plugins((
@@ -125,6 +126,7 @@ impl Plugin for GamePlugin {
             notifications::plugin,
             KeysPlugin,
             stage::plugin,
+            audio::plugin,
             input::plugin,
             ui::plugin,
             features::plugin,

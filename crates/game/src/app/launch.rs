@@ -1,5 +1,7 @@
 //! The start of the app: from a command line to a window or a video.
 
+#[cfg(feature = "sound")]
+use crate::app::audio;
 use crate::app::cli::Args;
 use crate::app::error::GameError;
 use crate::app::features::course::leaderboard;
@@ -82,6 +84,8 @@ pub fn run(args: &Args) -> Result<(), GameError> {
     interrupt::listen();
     let mut app = App::new();
     app.add_plugins(windowed(args.size())).add_plugins(game);
+    #[cfg(feature = "sound")]
+    app.add_plugins(audio::output);
     app.add_systems(Update, (question::close, interrupt::quit));
     if args.max_fps > 0 {
         app.insert_resource(FramePace(Duration::from_secs_f64(1.0 / f64::from(args.max_fps))));

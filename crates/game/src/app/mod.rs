@@ -1,8 +1,10 @@
 //! The `marathon-game` app: an app around the plugin.
 //!
-//! Read it from the bottom. `mode` has the states and the order of a frame, `stage` the characters, `input` the actions.
+//! Read it from the bottom. `mode` has the states and the order of a frame, `stage` the characters, `input` the actions, `audio`
+//! the sounds.
 //! `ui` has text and menu, `features` the modes. `cli` and `launch` start the app.
 
+mod audio;
 mod cli;
 mod display;
 mod error;
@@ -19,11 +21,15 @@ mod stage;
 mod ui;
 mod video;
 
+pub use audio::{PlaySound, RATE, Sound, Volumes};
 pub use cli::Args;
 pub use error::GameError;
 pub use features::course::leaderboard::{Course, KEPT, Place, ROWS, Run, Table};
 pub use features::course::{List, MOST_STEPS, Runs, Site, Step};
+pub use features::drag::Dragged;
+pub use features::film::{FilmProgram, FilmReel};
 pub use features::imitation::{GhostAt, Imitation, Reading};
+pub use features::limp::Limp;
 pub use features::perturb::{Ball, Perturbations};
 pub use features::remote::{Mailbox, RemotePose, RemoteSource};
 pub use features::replay::play::Playback;
@@ -46,7 +52,7 @@ pub use stage::puppets::Kind as PuppetKind;
 pub use stage::recording::{PlayRecording, Recording, Row};
 pub use stage::scenario::{LoadScenario, PolicySource, Scenario};
 pub use stage::selection::switch_mode;
-pub use stage::skin::{SkinState, WornSkin};
+pub use stage::skin::{SkinChoice, SkinFile, SkinState};
 pub use ui::menu::Menu;
 pub use ui::question::{Asked, Question};
 pub use ui::theme::Hud;

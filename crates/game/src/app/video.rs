@@ -6,7 +6,7 @@ use crate::app::error::GameError;
 use crate::app::features::replay::record::save_running;
 use crate::app::interrupt;
 use crate::app::pacing::{IsVideo, TICKS};
-use crate::app::stage::skin::{SkinState, WornSkin};
+use crate::app::stage::skin::{SkinState, generate_at_once};
 use bevy::app::{PluginsState, TerminalCtrlCHandlerPlugin};
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::RenderTarget;
@@ -217,6 +217,7 @@ fn windowless(game: impl Plugin) -> App {
     .init_resource::<Reel>()
     .insert_resource(IsVideo)
     .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
+    generate_at_once(&mut app);
     app
 }
 
@@ -235,22 +236,22 @@ fn target(app: &mut App, width: u32, height: u32) -> Handle<Image> {
     app.world_mut().resource_mut::<Assets<Image>>().add(target)
 }
 
-/// Waits until the skin is worn. A thread reads it.
+/// Waits until the skins are worn. A thread reads them.
 fn wait_for_skin(app: &mut App) -> Result<(), GameError> {
     let begun = Instant::now();
-    while let Some(skin) = app.world().get_resource::<WornSkin>() {
-        match &skin.state {
-            SkinState::Worn => break,
+    loop {
+        match app.world().resource::<SkinState>() {
+            SkinState::Worn => return Ok(()),
             SkinState::Refused(problem) => return Err(GameError::System(problem.clone())),
             SkinState::Waiting if begun.elapsed() > LONGEST_FITTING => {
-                return Err(GameError::System(format!("{}: it takes too long to read", skin.path.display())));
+                let problem = format!("the skin takes more than {} s to read", LONGEST_FITTING.as_secs());
+                return Err(GameError::System(problem));
             }
             SkinState::Waiting => {}
         }
         pace(app, Duration::ZERO);
         std::thread::sleep(Duration::from_millis(2));
     }
-    Ok(())
 }
 
 /// Updates the app after a step of time.

@@ -1,7 +1,10 @@
 //! The features of the modes. They exchange messages, and none imports another.
 
 pub mod course;
+pub mod drag;
+pub mod film;
 pub mod imitation;
+pub mod limp;
 pub mod perturb;
 pub mod remote;
 pub mod replay;
@@ -14,7 +17,10 @@ use bevy::prelude::*;
 pub(super) fn plugin(app: &mut App) {
     app.insert_resource(key_hints()).add_plugins((
         course::plugin,
+        drag::plugin,
+        film::plugin,
         imitation::plugin,
+        limp::plugin,
         perturb::plugin,
         remote::plugin,
         replay::plugin,

@@ -1,20 +1,19 @@
 //! Perturbations: pushes, balls, and other gravity and friction.
 
+use crate::app::audio::{PlaySound, Sound};
 use crate::app::input::actions::{Action, ActionPressed};
+use crate::app::input::pointer::{Gesture, Pointer};
 use crate::app::mode::{AppSet, Mode};
 use crate::app::stage::actors::{Actor, Focus};
+use crate::app::stage::rods::{Picked, Picking, Rod, nearest_on, rods};
 use crate::app::stage::scenario::LoadScenario;
 use crate::app::ui::hints::{KeyHints, ModeKeys};
 use crate::app::ui::theme::{Hud, UiSet, panel};
 use bevy::prelude::*;
-use bevy::window::PrimaryWindow;
 use bevy_egui::egui::{RichText, Slider};
-use bevy_egui::input::EguiWantsInput;
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
-use bevy_marathon::axes::{to_game, turn_to_game};
 use bevy_marathon::look::FollowCamera;
 use bevy_marathon::{Anatomy, Episode, Marathon, MarathonSystems, Part, Physique, Push, Ragdoll, RagdollState};
-use marathon_physics::model::{Geom, GeomType};
 use marathon_physics::{Model, Variation};
 
 /// Seconds that a push lasts.
@@ -31,6 +30,10 @@ const BOUNCE: f32 = 0.55;
 const GRAVITY: f32 = 9.81;
 /// Steps of a ball per tick: at its speed it must not pass through an arm.
 const BALL_STEPS: u32 = 8;
+
+/// Speed of an impact from which on it is heard, and from which on it is loudest, m/s.
+const HEARD: f32 = 0.5;
+const LOUD: f32 = 8.0;
 
 /// The physics of all characters, as factors of the normal one, and the strength of pushes.
 #[derive(Resource, Clone, Copy, Debug, PartialEq)]
@@ -90,7 +93,16 @@ pub(super) fn plugin(app: &mut App) {
 
 pub(super) fn key_hints(hints: &mut KeyHints) {
     const KEYS: ModeKeys = ModeKeys {
-        useful: &[Action::Menu, Action::Push, Action::Throw, Action::Restart, Action::Camera, Action::Contacts],
+        useful: &[
+            Action::Menu,
+            Action::Push,
+            Action::Throw,
+            Action::Limp,
+            Action::Slower,
+            Action::Film,
+            Action::Restart,
+        ],
+        mouse: Some(["click: push, drag: pull", "click a limb: push it   drag a limb: pull it   wheel: closer"]),
         ..ModeKeys::COMMON
     };
     hints.add(|scenario| scenario.mode == Mode::Push, &KEYS);
@@ -123,66 +135,6 @@ fn change(
     }
 }
 
-/// A shape of a character in the world: a rod with a radius, which a sphere is too; others by the rod within them.
-struct Rod {
-    ragdoll: Entity,
-    body: usize,
-    ends: [Vec3; 2],
-    radius: f32,
-}
-
-/// Rods of all geoms of a character whose bodies are at the given places.
-fn rods(ragdoll: Entity, anatomy: &Anatomy, place: impl Fn(usize) -> Option<GlobalTransform>) -> Vec<Rod> {
-    let mut rods = Vec::new();
-    for geom in anatomy.model.geoms.iter().filter(|g| anatomy.model.bodies[g.body].weld_id != 0) {
-        let (Some(part), Some((half, radius))) = (place(geom.body), rod(geom)) else { continue };
-        let center = part.transform_point(to_game(geom.pos));
-        let along = part.rotation() * (turn_to_game(geom.quat) * Vec3::Y) * half;
-        rods.push(Rod { ragdoll, body: geom.body, ends: [center - along, center + along], radius });
-    }
-    rods
-}
-
-fn rod(geom: &Geom) -> Option<(f32, f32)> {
-    let [x, y, z] = geom.size.map(|s| s as f32);
-    match geom.kind {
-        GeomType::Sphere => Some((0.0, x)),
-        GeomType::Capsule | GeomType::Cylinder => Some((y, x)),
-        GeomType::Ellipsoid | GeomType::Box => {
-            let radius = x.min(y).max(0.5 * x.max(y));
-            Some(((z - radius).max(0.0), radius))
-        }
-        GeomType::Plane | GeomType::Hfield | GeomType::Mesh => None,
-    }
-}
-
-fn nearest_on(rod: &Rod, point: Vec3) -> Vec3 {
-    let [a, b] = rod.ends;
-    let along = b - a;
-    let share = if along.length_squared() > 0.0 { (point - a).dot(along) / along.length_squared() } else { 0.0 };
-    a + along * share.clamp(0.0, 1.0)
-}
-
-/// The first rod that a ray meets, and where.
-fn hit(rods: &[Rod], ray: Ray3d) -> Option<(&Rod, Vec3)> {
-    let mut best: Option<(f32, &Rod, Vec3)> = None;
-    for rod in rods {
-        // the ray's closest approach, by turns: two lines are near each other after a few
-        let mut at = nearest_on(rod, ray.origin);
-        let mut reach = 0.0;
-        for _ in 0..8 {
-            reach = (at - ray.origin).dot(*ray.direction).max(0.0);
-            at = nearest_on(rod, ray.get_point(reach));
-        }
-        let distance = ray.get_point(reach).distance(at);
-        // a finger is thicker than a ray
-        if distance < rod.radius * 1.15 + 0.02 && best.as_ref().is_none_or(|(nearest, ..)| reach < *nearest) {
-            best = Some((reach, rod, ray.get_point(reach - rod.radius)));
-        }
-    }
-    best.map(|(_, rod, at)| (rod, at))
-}
-
 /// A push that changes the speed of the whole body by `speed`.
 fn push_of(model: &Model, speed: f32) -> f32 {
     let mass: f64 = model.bodies.iter().map(|b| b.mass).sum();
@@ -195,32 +147,19 @@ fn allowed(mode: Res<State<Mode>>) -> bool {
 }
 
 /// A click pushes what is under it, away from the camera.
-#[expect(clippy::too_many_arguments, reason = "a system names what it uses")]
 fn click(
-    buttons: Res<ButtonInput<MouseButton>>,
-    wants: Option<Res<EguiWantsInput>>,
+    pointer: Res<Pointer>,
     perturbations: Res<Perturbations>,
-    window: Query<&Window, With<PrimaryWindow>>,
-    camera: Query<(&Camera, &GlobalTransform), With<FollowCamera>>,
-    actors: Query<(Entity, &Anatomy), With<Ragdoll>>,
-    parts: Query<&GlobalTransform, With<Part>>,
+    picking: Picking<'_, '_>,
+    anatomies: Query<&Anatomy>,
     mut pushes: MessageWriter<Push>,
 ) {
-    let over_ui = wants.is_some_and(|w| w.wants_any_pointer_input());
-    if over_ui || !buttons.just_pressed(MouseButton::Left) {
-        return;
-    }
-    let Some(cursor) = window.iter().next().and_then(Window::cursor_position) else { return };
-    let Some(ray) = camera.iter().next().and_then(|(c, at)| c.viewport_to_world(at, cursor).ok()) else { return };
-    // the click hits what the screen shows
-    let shown = |anatomy: &Anatomy, body: usize| parts.get(*anatomy.parts.get(body)?).ok().copied();
-    let rods = actors.iter().flat_map(|(ragdoll, anatomy)| rods(ragdoll, anatomy, |body| shown(anatomy, body)));
-    let rods: Vec<Rod> = rods.collect();
-    let Some((rod, at)) = hit(&rods, ray) else { return };
-    let Ok((_, anatomy)) = actors.get(rod.ragdoll) else { return };
-    let force = *ray.direction * push_of(&anatomy.model, perturbations.push);
-    info!("pushed '{}'", anatomy.model.bodies[rod.body].name);
-    pushes.write(Push { ragdoll: rod.ragdoll, body: rod.body, force, at: Some(at), seconds: PUSH_SECONDS });
+    let Gesture::Click(cursor) = pointer.gesture else { return };
+    let Some(Picked { ragdoll, body, at, direction }) = picking.at(cursor) else { return };
+    let Ok(anatomy) = anatomies.get(ragdoll) else { return };
+    let force = *direction * push_of(&anatomy.model, perturbations.push);
+    info!("pushed '{}'", anatomy.model.bodies[body].name);
+    pushes.write(Push { ragdoll, body, force, at: Some(at), seconds: PUSH_SECONDS });
 }
 
 /// A key pushes the root of the character in focus: forwards and backwards by turns.
@@ -255,6 +194,7 @@ fn throw(
     (mode, focus): (Res<State<Mode>>, Res<Focus>),
     mut meshes: Option<ResMut<Assets<Mesh>>>,
     mut materials: Option<ResMut<Assets<StandardMaterial>>>,
+    mut sounds: MessageWriter<PlaySound>,
 ) {
     for _ in actions.read().filter(|action| action.0 == Action::Throw && *mode != Mode::Course) {
         let Some((camera, at)) = camera.iter().next() else { continue };
@@ -271,6 +211,7 @@ fn throw(
         let seconds = (from.distance(there) / BALL_SPEED).max(1e-3);
         // aim higher from afar, so that the ball does not fall short
         let velocity = (there - from) / seconds + moving + Vec3::Y * (0.5 * GRAVITY * perturbations.gravity * seconds);
+        sounds.write(PlaySound { sound: Sound::Throw, at: Some(from), loudness: 0.7 });
         let mut ball = commands.spawn((
             Name::new("ball"),
             Ball { velocity, mass: perturbations.ball, left: BALL_LIFE },
@@ -293,7 +234,7 @@ fn fly(
     mut balls: Query<(Entity, &mut Ball, &mut Transform), Without<Part>>,
     marathon: Res<Marathon>,
     actors: Query<(Entity, &Anatomy, &RagdollState, &GlobalTransform, &Episode), With<Ragdoll>>,
-    mut pushes: MessageWriter<Push>,
+    (mut pushes, mut sounds): (MessageWriter<Push>, MessageWriter<PlaySound>),
 ) {
     if balls.is_empty() {
         return;
@@ -315,6 +256,7 @@ fn fly(
             ball.velocity.y -= GRAVITY * perturbations.gravity * dt;
             transform.translation += ball.velocity * dt;
             if transform.translation.y < BALL_RADIUS && ball.velocity.y < 0.0 {
+                sounds.write_batch(impact(transform.translation, -ball.velocity.y));
                 transform.translation.y = BALL_RADIUS;
                 ball.velocity.y *= -BOUNCE;
                 ball.velocity *= Vec3::new(0.96, 1.0, 0.96);
@@ -332,6 +274,7 @@ fn fly(
                 if closing >= 0.0 {
                     continue;
                 }
+                sounds.write_batch(impact(transform.translation, -closing));
                 // the resistance of the body to a blow, as the contact solver has it
                 let lightness = anatomy.model.bodies[rod.body].invweight0[0] as f32;
                 let impulse = -(1.0 + BOUNCE) * closing / (1.0 / ball.mass + lightness);
@@ -344,6 +287,12 @@ fn fly(
             }
         }
     }
+}
+
+/// The sound of a ball that hits something at a speed, m/s.
+fn impact(at: Vec3, speed: f32) -> Option<PlaySound> {
+    let loudness = (speed / LOUD).powf(1.5).min(1.0);
+    (speed > HEARD).then_some(PlaySound { sound: Sound::Impact, at: Some(at), loudness })
 }
 
 /// Draws the sliders.
@@ -370,26 +319,4 @@ fn draw(mut contexts: EguiContexts, hud: Res<Hud>, mut perturbations: ResMut<Per
         *perturbations = now;
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rays_meet_the_nearest_rod() {
-        let rod = |x: f32, body| Rod {
-            ragdoll: Entity::PLACEHOLDER,
-            body,
-            ends: [Vec3::new(x, 0.0, 0.0), Vec3::new(x, 1.0, 0.0)],
-            radius: 0.1,
-        };
-        let rods = [rod(5.0, 1), rod(3.0, 2), rod(4.0, 3)];
-        let ray = |y: f32| Ray3d::new(Vec3::new(0.0, y, 0.0), Dir3::X);
-        let (first, at) = hit(&rods, ray(0.5)).expect("it is in the way");
-        assert!(first.body == 2 && at.distance(Vec3::new(2.9, 0.5, 0.0)) < 0.02, "{at}");
-        assert!(hit(&rods, ray(1.3)).is_none());
-        // beyond the end, within the cap
-        assert!(hit(&rods, ray(1.08)).is_some());
-    }
 }

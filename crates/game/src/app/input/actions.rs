@@ -29,6 +29,10 @@ pub enum Action {
     Push,
     /// Throw a ball at the character in focus.
     Throw,
+    /// Take the strength of the character in focus away, or give it back.
+    Limp,
+    /// Keep the last ten seconds as a film.
+    Film,
     /// Show contacts and forces.
     Contacts,
     /// Show joints and limits.

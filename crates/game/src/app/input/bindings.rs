@@ -13,7 +13,7 @@ use std::path::PathBuf;
 /// An action, its name on the screen, its key and its button.
 type Row = (Action, &'static str, KeyCode, Option<GamepadButton>);
 
-const DEFAULTS: [Row; 29] = [
+const DEFAULTS: [Row; 31] = [
     (Action::Menu, "menu", KeyCode::Escape, Some(GamepadButton::Start)),
     (Action::Pause, "pause", KeyCode::Enter, Some(GamepadButton::Select)),
     (Action::Step, "one step", KeyCode::Period, None),
@@ -25,6 +25,8 @@ const DEFAULTS: [Row; 29] = [
     (Action::Camera, "camera", KeyCode::KeyC, Some(GamepadButton::LeftTrigger)),
     (Action::Push, "push", KeyCode::KeyP, Some(GamepadButton::South)),
     (Action::Throw, "throw a ball", KeyCode::KeyB, Some(GamepadButton::East)),
+    (Action::Limp, "limp", KeyCode::KeyZ, None),
+    (Action::Film, "film of the last 10 s", KeyCode::F9, None),
     (Action::Contacts, "contacts", KeyCode::KeyF, None),
     (Action::Joints, "joints", KeyCode::KeyJ, None),
     (Action::Ghost, "ghost of the clip", KeyCode::KeyK, None),

@@ -5,6 +5,7 @@ pub mod bindings;
 pub mod camera;
 pub mod control;
 pub mod key_names;
+pub mod pointer;
 pub mod response;
 pub mod scripted;
 pub mod steering;
@@ -18,5 +19,5 @@ pub(super) fn keys_plugin(app: &mut App) {
 
 /// Adds what actions, mouse and gamepads do.
 pub(super) fn plugin(app: &mut App) {
-    app.add_plugins((camera::plugin, control::plugin, scripted::plugin, steering::plugin));
+    app.add_plugins((camera::plugin, control::plugin, pointer::plugin, scripted::plugin, steering::plugin));
 }

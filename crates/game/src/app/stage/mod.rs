@@ -7,6 +7,7 @@ pub mod loaded;
 pub mod policies;
 pub mod puppets;
 pub mod recording;
+pub mod rods;
 pub mod scenario;
 pub mod selection;
 pub mod skin;

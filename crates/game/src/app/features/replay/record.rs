@@ -9,6 +9,7 @@ use crate::app::notifications::Notifications;
 use crate::app::stage::actors::Actor;
 use crate::app::stage::loaded::LoadedPolicy;
 use crate::app::stage::recording::Recording;
+use crate::app::stage::recording::tape::Tape;
 use crate::app::stage::scenario::{LoadScenario, Scenario};
 use crate::app::stage::spawn::{enter_mode, spawn};
 use crate::app::ui::question::{AtStake, ReportSet};
@@ -18,7 +19,6 @@ use bevy::prelude::*;
 use bevy_marathon::{Anatomy, Episode, Marathon, MarathonSystems, RagdollState};
 use marathon_physics::budget;
 use std::path::PathBuf;
-use std::time::Duration;
 
 /// Longest recording, frames.
 const LONGEST: usize = 60_000;
@@ -27,22 +27,18 @@ const FILLED: f64 = 0.75;
 
 /// A recording that is being made.
 #[derive(Resource)]
-pub struct Recorder {
-    recording: Recording,
-    /// Time of the newest frame.
-    until: Duration,
-}
+pub struct Recorder(Tape);
 
 impl Recorder {
     /// Length so far, s.
     pub fn seconds(&self) -> f64 {
-        self.recording.seconds()
+        self.0.recording.seconds()
     }
 
     /// Whether the replay has reached its maximum length.
     fn is_full(&self) -> bool {
         let most = budget::REPLAY_FILE.most().unwrap_or(0) as f64;
-        self.recording.frames() >= LONGEST || self.recording.bytes() as f64 > FILLED * most
+        self.0.recording.frames() >= LONGEST || self.0.recording.bytes() as f64 > FILLED * most
     }
 }
 
@@ -95,7 +91,7 @@ fn control(
     *requested = false;
     let places = all.iter().flat_map(|(.., t)| t.translation.to_array()).collect();
     let recording = Recording::new(loaded.task_config.clone(), loaded.ground, anatomy.dt, places);
-    commands.insert_resource(Recorder { recording, until: Duration::ZERO });
+    commands.insert_resource(Recorder(Tape::new(recording)));
     notes.say("recording; the same key ends it");
 }
 
@@ -136,11 +132,11 @@ pub fn save_running(world: &mut World) {
 
 /// Saves a recording and shows a note.
 fn finish(recorder: &Recorder, why: &str, notes: &mut Notifications) {
-    if recorder.recording.frames() == 0 {
+    if recorder.0.recording.frames() == 0 {
         notes.say(format!("{why}nothing was recorded"));
         return;
     }
-    match keep(&recorder.recording) {
+    match keep(&recorder.0.recording) {
         Ok(path) => {
             let (path, video) = (path.display().to_string(), path.with_extension("mp4").display().to_string());
             notes.say(format!("{why}saved as {path}; a video of it: marathon-game --replay {path} --record {video}"));
@@ -165,19 +161,6 @@ fn record(
     let Some(mut recorder) = recorder else { return };
     let mut all: Vec<_> = actors.iter().collect();
     all.sort_by_key(|(actor, ..)| actor.0);
-    let Recorder { recording, until, .. } = &mut *recorder;
-    if all.len() != recording.agents {
-        return;
-    }
-    let histories: Vec<_> = all.iter().filter_map(|(_, state, ..)| marathon.history(state)).collect();
-    let Some(first) = histories.first() else { return };
-    let times: Vec<Duration> = first.iter().map(|s| s.time).filter(|t| *t > *until).collect();
-    for time in times {
-        let samples: Option<Vec<_>> = histories.iter().map(|t| t.iter().rfind(|s| s.time == time)).collect();
-        let Some(samples) = samples else { continue };
-        *until = time;
-        for (sample, (.., episode, anatomy)) in samples.iter().zip(&all) {
-            recording.push_state(sample, episode, anatomy);
-        }
-    }
+    let all: Vec<_> = all.into_iter().map(|(_, state, episode, anatomy)| (state, episode, anatomy)).collect();
+    recorder.0.append(&marathon, &all);
 }

@@ -3,6 +3,7 @@
 //! Coordinates have the precision of the simulation, and the ground is recorded as it changes: a replay shows the run to the bit.
 
 mod file;
+pub mod tape;
 
 use bevy::prelude::*;
 use bevy_marathon::{Anatomy, Episode, Ground, PoseSample, pose};
@@ -106,6 +107,31 @@ impl Recording {
         if known.map_or(!row.grounds.is_empty(), |lie| !Arc::ptr_eq(&lie.fields, row.grounds)) {
             self.grounds.push(Lie { frame, agent, fields: row.grounds.clone() });
         }
+    }
+
+    /// Removes frames from the start.
+    pub fn drop_front(&mut self, frames: usize) {
+        let all = self.frames();
+        let frames = frames.min(all);
+        if frames == 0 {
+            return;
+        }
+        fn cut<T>(rows: &mut Vec<T>, frames: usize, all: usize) {
+            rows.drain(..rows.len() / all * frames);
+        }
+        for rows in [&mut self.numbers, &mut self.terms, &mut self.actions, &mut self.untimed] {
+            cut(rows, frames, all);
+        }
+        for rows in [&mut self.qpos, &mut self.commands] {
+            cut(rows, frames, all);
+        }
+        // the ground that an agent stands on at the new start
+        let standing = (0..self.agents)
+            .filter_map(|agent| self.grounds.iter().rfind(|lie| lie.agent == agent && lie.frame <= frames))
+            .map(|lie| Lie { frame: 0, ..lie.clone() });
+        let later = self.grounds.iter().filter(|lie| lie.frame > frames);
+        let later = later.map(|lie| Lie { frame: lie.frame - frames, ..lie.clone() });
+        self.grounds = standing.chain(later).collect();
     }
 
     /// Appends a state of the next agent. All rows of a recording have the same width, but an episode has no terms of the

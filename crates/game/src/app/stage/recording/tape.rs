@@ -1,0 +1,38 @@
+//! The decisions of running characters, as a recording that grows.
+
+use super::Recording;
+use bevy_marathon::{Anatomy, Episode, Marathon, RagdollState};
+use std::time::Duration;
+
+/// A recording of running characters.
+pub struct Tape {
+    /// The recorded decisions.
+    pub recording: Recording,
+    /// Time of the newest frame.
+    until: Duration,
+}
+
+impl Tape {
+    /// An empty recording grows from here on.
+    pub fn new(recording: Recording) -> Self {
+        Tape { recording, until: Duration::ZERO }
+    }
+
+    /// Appends the decisions since the last tick, of all characters in their order. Nothing is appended while some are missing.
+    pub fn append(&mut self, marathon: &Marathon, all: &[(&RagdollState, &Episode, &Anatomy)]) {
+        if all.len() != self.recording.agents {
+            return;
+        }
+        let histories: Vec<_> = all.iter().filter_map(|(state, ..)| marathon.history(state)).collect();
+        let Some(first) = histories.first() else { return };
+        let times: Vec<Duration> = first.iter().map(|s| s.time).filter(|t| *t > self.until).collect();
+        for time in times {
+            let samples: Option<Vec<_>> = histories.iter().map(|t| t.iter().rfind(|s| s.time == time)).collect();
+            let Some(samples) = samples else { continue };
+            self.until = time;
+            for (sample, (_, episode, anatomy)) in samples.iter().zip(all) {
+                self.recording.push_state(sample, episode, anatomy);
+            }
+        }
+    }
+}
