@@ -4,7 +4,7 @@ use crate::app::cli::{self, Args};
 use crate::app::error::GameError;
 use crate::app::features::course::{Runs, check_table};
 use crate::app::features::replay::play::Playback;
-use crate::app::features::training::{TrainingOptions, settings};
+use crate::app::features::training::{self, TrainingOptions};
 use crate::app::input::camera::ChosenCamera;
 use crate::app::input::scripted::{ScriptedActions, ScriptedInputs};
 use crate::app::mode::Mode;
@@ -12,9 +12,12 @@ use crate::app::stage::actors::ShownMarks;
 use crate::app::stage::policies::ShippedPolicies;
 use crate::app::stage::recording::Recording;
 use crate::app::stage::scenario::Scenario;
+use crate::app::settings::apply::AutomaticQuality;
+use crate::app::settings::{Detail, Interface, Settings, SkinChoice};
 use crate::app::stage::skin::SkinFile;
+use crate::app::ui::menu::{Menu, Screen};
 use crate::app::ui::theme::Hud;
-use crate::app::{features, input, mode, notifications, pacing, stage, ui};
+use crate::app::{features, input, mode, notifications, pacing, settings, stage, ui};
 use bevy::prelude::*;
 use bevy_egui::EguiPlugin;
 use bevy_marathon::look::{
@@ -31,6 +34,8 @@ pub struct GamePlugin {
     playback: Option<Playback>,
     skin: Option<SkinFile>,
     quality: Quality,
+    automatic: Quality,
+    settings: Settings,
 }
 
 impl GamePlugin {
@@ -55,7 +60,7 @@ impl GamePlugin {
             playback = Some(Playback::new(recording)?);
         }
         if scenario.mode == Mode::Learn {
-            settings(&scenario.task_config(&shipped)?, &TrainingOptions { learn: args.learn.clone(), seed: 0 })?;
+            training::settings(&scenario.task_config(&shipped)?, &TrainingOptions { learn: args.learn.clone(), seed: 0 })?;
         }
         if scenario.mode == Mode::Course {
             check_table(args.table.as_deref())?;
@@ -64,12 +69,36 @@ impl GamePlugin {
             scenario.mode = Mode::Outside;
         }
         let skin = args.skin.as_deref().map(|skin| SkinFile::read(skin, args.mapping.as_deref())).transpose()?;
-        Ok(GamePlugin { args: args.clone(), scenario, shipped, playback, skin, quality: args.quality() })
+        // videos and tests show all numbers, and do not depend on what a user has set
+        let interface = Interface { detail: Detail::Full, prompts: args.prompts, ..Interface::default() };
+        let settings = Settings { interface, ..Settings::default() };
+        Ok(GamePlugin { args: args.clone(), scenario, shipped, playback, skin, quality: args.quality(), automatic: Quality::default(), settings })
     }
 
-    /// Sets the quality of the picture.
-    pub fn set_quality(&mut self, quality: Quality) {
-        self.quality = quality;
+    /// Takes the settings of the player. Options of the command line win over them.
+    ///
+    /// # Errors
+    /// If the skin of the settings cannot be read; the other settings are taken.
+    pub fn set_settings(&mut self, settings: Settings) -> Result<(), GameError> {
+        let chosen = settings.skin.clone();
+        if let Some(quality) = settings.display.quality.quality().filter(|_| self.args.quality.is_none()) {
+            self.quality = quality;
+        }
+        self.settings = settings;
+        if self.skin.is_none() {
+            self.skin = match chosen {
+                SkinChoice::File(path) => Some(SkinFile::read(&path, None)?),
+                SkinChoice::Automatic if self.args.opens_menu() => Some(SkinFile::shipped().optional()),
+                SkinChoice::Automatic | SkinChoice::Shapes => None,
+            };
+        }
+        Ok(())
+    }
+
+    /// Sets the quality that fits the computer, unless the command line sets one.
+    pub fn set_automatic_quality(&mut self, quality: Quality) {
+        self.automatic = quality;
+        self.quality = self.args.quality.unwrap_or(quality);
     }
 
     /// The task of the scenario.
@@ -86,7 +115,10 @@ impl GamePlugin {
         app.insert_state(self.scenario.mode)
             .insert_resource(self.scenario.clone())
             .insert_resource(self.shipped.clone())
-            .insert_resource(Hud { on: !args.no_hud, help: false })
+            .insert_resource(Hud { on: !args.no_hud, help: false, detail: self.settings.interface.detail })
+            .insert_resource(AutomaticQuality(self.automatic))
+            .insert_resource(self.settings.clone())
+            .insert_resource(self.settings.bindings.clone())
             .insert_resource(ShownMarks { contacts: args.contacts, joints: args.joints })
             .insert_resource(TrainingOptions { learn: args.learn.clone(), seed: args.seed() })
             .insert_resource(ChosenCamera(args.camera))
@@ -96,6 +128,11 @@ impl GamePlugin {
             .insert_resource(ScriptedActions::new(args.action.clone()))
             .insert_resource(ScriptedInputs::new(&args.input))
             .insert_resource(Runs::new(args.table.clone(), args.player.clone()));
+        if args.opens_menu() {
+            let mut menu = Menu::default();
+            menu.show(Screen::Main);
+            app.insert_resource(menu);
+        }
         if let Some(skin) = self.skin.clone() {
             app.insert_resource(skin);
         }
@@ -122,6 +159,7 @@ impl Plugin for GamePlugin {
             mode::plugin,
             pacing::plugin,
             notifications::plugin,
+            settings::plugin,
             KeysPlugin,
             stage::plugin,
             input::plugin,

@@ -4,7 +4,9 @@ pub mod actions;
 pub mod bindings;
 pub mod camera;
 pub mod control;
+pub mod device;
 pub mod key_names;
+pub mod rebind;
 pub mod response;
 pub mod scripted;
 pub mod steering;
@@ -13,10 +15,10 @@ use bevy::prelude::*;
 
 /// Adds the actions and their [bindings].
 pub(super) fn keys_plugin(app: &mut App) {
-    app.add_plugins((actions::plugin, bindings::plugin));
+    app.add_plugins((actions::plugin, bindings::plugin, rebind::plugin));
 }
 
 /// Adds what actions, mouse and gamepads do.
 pub(super) fn plugin(app: &mut App) {
-    app.add_plugins((camera::plugin, control::plugin, scripted::plugin, steering::plugin));
+    app.add_plugins((camera::plugin, control::plugin, device::plugin, scripted::plugin, steering::plugin));
 }

@@ -28,6 +28,8 @@ pub struct SkinFile {
     bytes: Vec<u8>,
     /// Text of the mapping file, if the command line sets one.
     mapping: Option<Mapping>,
+    /// Characters that cannot wear it keep their shapes without an error.
+    optional: bool,
 }
 
 /// A mapping file.
@@ -46,6 +48,7 @@ pub struct WornSkin {
     pub state: SkinState,
     scene: Handle<WorldAsset>,
     mapping: Option<Mapping>,
+    optional: bool,
 }
 
 /// The progress of a [`WornSkin`].
@@ -74,7 +77,7 @@ impl SkinFile {
         let mapping = mapping.map(read).transpose()?;
         let (name, bytes) = SHIPPED;
         if path == Path::new(name) && !path.exists() {
-            return Ok(SkinFile { path: path.into(), bytes: bytes.into(), mapping });
+            return Ok(SkinFile { path: path.into(), bytes: bytes.into(), mapping, optional: false });
         }
         exists(path)?;
         let bytes = budget::read(path, &budget::SKIN_FILE)
@@ -86,7 +89,18 @@ impl SkinFile {
         if let Some(problem) = needs(&bytes) {
             return Err(wrong(path, problem));
         }
-        Ok(SkinFile { path: path.into(), bytes, mapping })
+        Ok(SkinFile { path: path.into(), bytes, mapping, optional: false })
+    }
+
+    /// The skin that comes with Marathon.
+    pub fn shipped() -> Self {
+        let (name, bytes) = SHIPPED;
+        SkinFile { path: name.into(), bytes: bytes.into(), mapping: None, optional: false }
+    }
+
+    /// The same for those characters alone that can wear it.
+    pub fn optional(self) -> Self {
+        SkinFile { optional: true, ..self }
     }
 }
 
@@ -133,7 +147,8 @@ fn load(mut commands: Commands, file: Res<SkinFile>, registry: Res<EmbeddedAsset
     registry.insert_asset(PLACE.into(), Path::new(PLACE), file.bytes.clone());
     let scene = server.load(GltfAssetLabel::Scene(0).from_asset(format!("embedded://{PLACE}")));
     let (path, mapping) = (file.path.clone(), file.mapping.clone());
-    commands.insert_resource(WornSkin { path, state: SkinState::Waiting, scene, mapping });
+    let optional = file.optional;
+    commands.insert_resource(WornSkin { path, state: SkinState::Waiting, scene, mapping, optional });
 }
 
 /// Gives the skin to characters that have none.
@@ -165,7 +180,9 @@ fn report(
         };
         let text = format!("{path} cannot be worn{}: {problem}{option}", mapping.unwrap_or_default());
         if skin.state != SkinState::Refused(text.clone()) {
-            notes.error(text.clone());
+            if !skin.optional {
+                notes.error(text.clone());
+            }
             skin.state = SkinState::Refused(text);
         }
     } else if !dressed.is_empty() {

@@ -1,5 +1,8 @@
 //! The look of text and cards, and the order in which they are drawn.
 
+use crate::app::input::actions::KeysFor;
+use crate::app::mode::AppSet;
+use crate::app::settings::{Detail, Settings, TEXT_SIZE};
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, Area, Color32, CornerRadius, FontFamily, FontId, Frame, Id, Margin, RichText, Ui};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
@@ -28,11 +31,20 @@ pub struct Hud {
     pub on: bool,
     /// All keys.
     pub help: bool,
+    /// How much of it.
+    pub detail: Detail,
 }
 
 impl Default for Hud {
     fn default() -> Self {
-        Hud { on: true, help: false }
+        Hud { on: true, help: false, detail: Detail::Full }
+    }
+}
+
+impl Hud {
+    /// Whether the numbers of task, policy and reward are shown.
+    pub fn is_full(&self) -> bool {
+        self.on && self.detail == Detail::Full
     }
 }
 
@@ -51,8 +63,20 @@ pub enum UiSet {
 
 pub(super) fn plugin(app: &mut App) {
     app.init_resource::<Hud>()
+        .add_systems(Update, follow_settings.run_if(resource_changed::<Settings>).in_set(AppSet::Present))
         .configure_sets(EguiPrimaryContextPass, (UiSet::Prepare, UiSet::Hud, UiSet::Panels, UiSet::Windows).chain())
+        // a menu is alone on the screen
+        .configure_sets(EguiPrimaryContextPass, (UiSet::Hud, UiSet::Panels).run_if(not(resource_equals(KeysFor::Menu))))
         .add_systems(EguiPrimaryContextPass, (style, fit).chain().in_set(UiSet::Prepare));
+}
+
+/// Shows as much as the player has chosen. A key may hide it for a while.
+fn follow_settings(settings: Res<Settings>, mut hud: ResMut<Hud>) {
+    let detail = settings.interface.detail;
+    if hud.detail != detail {
+        hud.detail = detail;
+        hud.on = detail != Detail::Nothing;
+    }
 }
 
 /// Sets the look of menus and sliders.
@@ -75,11 +99,17 @@ fn style(mut contexts: EguiContexts, mut done: Local<bool>) -> Result {
     Ok(())
 }
 
-/// Scales text and bars to the picture.
-fn fit(mut contexts: EguiContexts, cameras: Query<&Camera, With<FollowCamera>>) -> Result {
+/// Scales text and bars to the picture, and to the size of text that the player has chosen.
+fn fit(
+    mut contexts: EguiContexts,
+    settings: Res<Settings>,
+    cameras: Query<&Camera, With<FollowCamera>>,
+) -> Result {
     let ctx = contexts.ctx_mut()?;
     if let Some(size) = cameras.iter().next().and_then(Camera::logical_viewport_size) {
-        ctx.set_zoom_factor((size.x / FULL[0]).min(size.y / FULL[1]).clamp(SMALLEST, 1.0));
+        let fits = (size.x / FULL[0]).min(size.y / FULL[1]).clamp(SMALLEST, 1.0);
+        let chosen = settings.interface.text_size.clamp(*TEXT_SIZE.start(), *TEXT_SIZE.end());
+        ctx.set_zoom_factor(fits * chosen);
     }
     Ok(())
 }

@@ -1,0 +1,3 @@
+//! placeholder
+use bevy::prelude::*;
+pub(super) fn plugin(_: &mut App) {}
