@@ -301,7 +301,8 @@ fn random_event(app: &mut App, dice: &mut Dice, window: Entity, pad: Entity) {
         1 => press(app, keys[dice.roll(keys.len())]),
         2 => devices::press(app, pad, BUTTONS[dice.roll(BUTTONS.len())]),
         3 => {
-            let axes = [GamepadAxis::LeftStickX, GamepadAxis::LeftStickY, GamepadAxis::RightStickX, GamepadAxis::RightStickY];
+            let axes =
+                [GamepadAxis::LeftStickX, GamepadAxis::LeftStickY, GamepadAxis::RightStickX, GamepadAxis::RightStickY];
             devices::push(app, pad, axes[dice.roll(4)], dice.share());
         }
         4 => {
@@ -309,7 +310,13 @@ fn random_event(app: &mut App, dice: &mut Dice, window: Entity, pad: Entity) {
             app.world_mut().write_message(CursorMoved { window, position: at, delta: None });
             app.world_mut().write_message(MouseMotion { delta: 30.0 * Vec2::new(dice.share(), dice.share()) });
             let (unit, y) = (MouseScrollUnit::Line, dice.share().round());
-            app.world_mut().write_message(MouseWheel { unit, x: 0.0, y, window, phase: bevy::input::touch::TouchPhase::Moved });
+            app.world_mut().write_message(MouseWheel {
+                unit,
+                x: 0.0,
+                y,
+                window,
+                phase: bevy::input::touch::TouchPhase::Moved,
+            });
             app.update();
         }
         _ => {

@@ -10,8 +10,8 @@ use bevy::prelude::*;
 use bevy::window::WindowResolution;
 use bevy_egui::{EguiContext, PrimaryEguiContext, egui};
 use marathon_game::app::{
-    Bindable, Bindings, Detail, Hud, Menu, Mode, Press, Prompts, QualityChoice, Scenario, Screen, Settings, SettingsFile,
-    ShippedPolicies, Steer, Volumes, load_settings, switch_mode,
+    Bindable, Bindings, Detail, Hud, Menu, Mode, Press, Prompts, QualityChoice, Scenario, Screen, Settings,
+    SettingsFile, ShippedPolicies, Steer, Volumes, load_settings, switch_mode,
 };
 use std::error::Error;
 use std::time::Duration;

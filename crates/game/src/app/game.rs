@@ -8,14 +8,14 @@ use crate::app::features::training::{self, TrainingOptions};
 use crate::app::input::camera::ChosenCamera;
 use crate::app::input::scripted::{ScriptedActions, ScriptedInputs};
 use crate::app::mode::Mode;
+use crate::app::settings::apply::AutomaticQuality;
+use crate::app::settings::values::{Detail, Interface, Settings, SkinChoice};
 use crate::app::stage::actors::ShownMarks;
 use crate::app::stage::policies::ShippedPolicies;
 use crate::app::stage::recording::Recording;
 use crate::app::stage::scenario::Scenario;
-use crate::app::settings::apply::AutomaticQuality;
-use crate::app::settings::{Detail, Interface, Settings, SkinChoice};
 use crate::app::stage::skin::SkinFile;
-use crate::app::ui::menu::{Menu, Screen};
+use crate::app::ui::menu::state::{Menu, Screen};
 use crate::app::ui::theme::Hud;
 use crate::app::{features, input, mode, notifications, pacing, settings, stage, ui};
 use bevy::prelude::*;
@@ -60,7 +60,10 @@ impl GamePlugin {
             playback = Some(Playback::new(recording)?);
         }
         if scenario.mode == Mode::Learn {
-            training::settings(&scenario.task_config(&shipped)?, &TrainingOptions { learn: args.learn.clone(), seed: 0 })?;
+            training::settings(
+                &scenario.task_config(&shipped)?,
+                &TrainingOptions { learn: args.learn.clone(), seed: 0 },
+            )?;
         }
         if scenario.mode == Mode::Course {
             check_table(args.table.as_deref())?;
@@ -72,7 +75,16 @@ impl GamePlugin {
         // videos and tests show all numbers, and do not depend on what a user has set
         let interface = Interface { detail: Detail::Full, prompts: args.prompts, ..Interface::default() };
         let settings = Settings { interface, ..Settings::default() };
-        Ok(GamePlugin { args: args.clone(), scenario, shipped, playback, skin, quality: args.quality(), automatic: Quality::default(), settings })
+        Ok(GamePlugin {
+            args: args.clone(),
+            scenario,
+            shipped,
+            playback,
+            skin,
+            quality: args.quality(),
+            automatic: Quality::default(),
+            settings,
+        })
     }
 
     /// Takes the settings of the player. Options of the command line win over them.

@@ -145,5 +145,6 @@ impl Steering {
 pub(super) fn plugin(app: &mut App) {
     app.init_resource::<Steering>()
         .init_resource::<KeysFor>()
-        .add_message::<ActionRequested>().add_message::<ActionPressed>();
+        .add_message::<ActionRequested>()
+        .add_message::<ActionPressed>();
 }

@@ -1,12 +1,9 @@
-//! The keys and buttons of actions and of the controls that steer: their defaults, and the actions that they request.
+//! The keys and buttons of actions and of the controls that steer, and their defaults.
 
-use crate::app::input::actions::{Action, ActionRequested, KeysFor, Steer, Steering};
+use crate::app::input::actions::{Action, Steer, Steering};
 use crate::app::input::key_names::{BUTTON_NAMES, KEYS, button_name, key_name};
-use crate::app::input::rebind::Rebinding;
-use bevy::input::InputSystems;
-use bevy::input::gamepad::{Gamepad, GamepadButton};
+use bevy::input::gamepad::GamepadButton;
 use bevy::prelude::*;
-use bevy_egui::input::EguiWantsInput;
 use clap::ValueEnum;
 use marathon_physics::hint::among;
 use serde::de::Error as _;
@@ -107,12 +104,8 @@ impl Default for Bindings {
     }
 }
 
-/// The system that turns keys and buttons into actions.
-#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct ReadSet;
-
 pub(super) fn plugin(app: &mut App) {
-    app.init_resource::<Bindings>().add_systems(PreUpdate, read.in_set(ReadSet).after(InputSystems));
+    app.init_resource::<Bindings>();
 }
 
 impl Bindable {
@@ -164,10 +157,11 @@ impl Bindings {
     /// Whether a key or button steers now.
     pub fn steers(&self, steering: Steering, press: Press) -> bool {
         let trigger = [GamepadButton::LeftTrigger2, GamepadButton::RightTrigger2].map(Press::Button).contains(&press);
-        trigger && steering.on && !steering.by_camera || self.rows.iter().any(|row| match row.what {
-            Bindable::Steer(steer) => steering.takes(steer) && row.has(press),
-            Bindable::Action(_) => false,
-        })
+        trigger && steering.on && !steering.by_camera
+            || self.rows.iter().any(|row| match row.what {
+                Bindable::Steer(steer) => steering.takes(steer) && row.has(press),
+                Bindable::Action(_) => false,
+            })
     }
 
     /// The row of an action or control.
@@ -250,7 +244,8 @@ impl<'de> Deserialize<'de> for Bindings {
             if let Some(name) = written.keys.get(&what.id()) {
                 let known = KEYS.iter().find(|(_, known)| known == name);
                 let names = KEYS.map(|(_, name)| name);
-                let (key, _) = known.ok_or_else(|| D::Error::custom(format!("no key '{name}'{}", among(name, &names))))?;
+                let (key, _) =
+                    known.ok_or_else(|| D::Error::custom(format!("no key '{name}'{}", among(name, &names))))?;
                 bindings.bind(what, Press::Key(*key));
             }
             match written.pad.get(&what.id()) {
@@ -268,36 +263,6 @@ impl<'de> Deserialize<'de> for Bindings {
             }
         }
         Ok(bindings)
-    }
-}
-
-/// Turns keys and buttons into actions.
-fn read(
-    keys: Res<ButtonInput<KeyCode>>,
-    pads: Query<&Gamepad>,
-    (bindings, rebinding, keys_for): (Res<Bindings>, Res<Rebinding>, Res<KeysFor>),
-    wants: Option<Res<EguiWantsInput>>,
-    steering: Option<Res<Steering>>,
-    mut pressed: MessageWriter<ActionRequested>,
-) {
-    // the next key is to be bound
-    if rebinding.is_busy() {
-        return;
-    }
-    // a text field has the keyboard; in a menu, any item may have it
-    let typing = *keys_for == KeysFor::Game && wants.is_some_and(|w| w.wants_keyboard_input());
-    let steering = steering.map_or_else(Steering::default, |steering| *steering);
-    for row in &bindings.rows {
-        let Bindable::Action(action) = row.what else { continue };
-        let free = |press: Press| *keys_for != KeysFor::Game || !bindings.steers(steering, press);
-        let key = !typing && keys.just_pressed(row.key) && free(Press::Key(row.key));
-        let own = row.button.filter(|button| free(Press::Button(*button)));
-        let button = own.is_some_and(|button| pads.iter().any(|pad| pad.just_pressed(button)));
-        // the same key again answers a question, and buttons are for its items
-        let key = key && (*keys_for == KeysFor::Question || keys_for.allows(action));
-        if key || button && keys_for.allows(action) {
-            pressed.write(ActionRequested(action));
-        }
     }
 }
 

@@ -6,6 +6,7 @@ pub mod camera;
 pub mod control;
 pub mod device;
 pub mod key_names;
+pub mod read;
 pub mod rebind;
 pub mod response;
 pub mod scripted;
@@ -15,7 +16,7 @@ use bevy::prelude::*;
 
 /// Adds the actions and their [bindings].
 pub(super) fn keys_plugin(app: &mut App) {
-    app.add_plugins((actions::plugin, bindings::plugin, rebind::plugin));
+    app.add_plugins((actions::plugin, bindings::plugin, read::plugin, rebind::plugin));
 }
 
 /// Adds what actions, mouse and gamepads do.

@@ -1,8 +1,9 @@
 //! Changes of bindings: the next key or button that is pressed is bound. If it is taken, the player decides.
 
-use crate::app::input::bindings::{Bindable, Bindings, Press, ReadSet};
+use crate::app::input::bindings::{Bindable, Bindings, Press};
 use crate::app::input::device::Device;
 use crate::app::input::key_names::{BUTTON_NAMES, KEYS};
+use bevy::input::InputSystems;
 use bevy::input::gamepad::Gamepad;
 use bevy::prelude::*;
 
@@ -40,7 +41,7 @@ pub enum Rebinding {
 pub struct RebindSet;
 
 pub(super) fn plugin(app: &mut App) {
-    app.init_resource::<Rebinding>().add_systems(PreUpdate, rebind.in_set(RebindSet).after(ReadSet));
+    app.init_resource::<Rebinding>().add_systems(PreUpdate, rebind.in_set(RebindSet).after(InputSystems));
 }
 
 impl Rebinding {

@@ -2,8 +2,9 @@
 //! [mapping](Mapping). A [frame](SteeringFrame) says which way a stick points.
 
 use crate::app::input::actions::{Action, ActionPressed, KeysFor, Steer, Steering};
-use crate::app::input::bindings::{Bindings, ReadSet};
+use crate::app::input::bindings::Bindings;
 use crate::app::input::key_names::{button_name, key_name};
+use crate::app::input::read::ReadSet;
 use crate::app::input::response::{Mapping, Mappings};
 use crate::app::mode::Mode;
 use crate::app::stage::actors::{Actor, Focus};
@@ -124,7 +125,12 @@ pub fn controls(ranges: &[CommandRange], by_camera: bool, bindings: &Bindings) -
             all.extend(command_controls(ranges, bindings));
             all
         }
-        _ => [ahead, aside].iter().take(ranges.len()).enumerate().map(|(i, keys)| number(keys, "left stick", i)).collect(),
+        _ => [ahead, aside]
+            .iter()
+            .take(ranges.len())
+            .enumerate()
+            .map(|(i, keys)| number(keys, "left stick", i))
+            .collect(),
     }
 }
 
@@ -426,7 +432,10 @@ mod tests {
     fn controls_have_the_names_of_what_they_set() {
         let range = |name, unit| CommandRange::new(name, 0.0..=1.0, unit);
         let names = |ranges: &[CommandRange]| {
-            controls(ranges, false, &Bindings::default()).into_iter().map(|c| format!("{}/{}: {}", c.keys, c.pad, c.does)).collect::<Vec<_>>()
+            controls(ranges, false, &Bindings::default())
+                .into_iter()
+                .map(|c| format!("{}/{}: {}", c.keys, c.pad, c.does))
+                .collect::<Vec<_>>()
         };
         let all = [range("speed", "m/s"), range("left", "m/s"), range("turn", "rad/s"), range("jump", "")];
         let with_all = [
@@ -442,7 +451,10 @@ mod tests {
         assert_eq!(names(&all[..1]), ["Up Down Left Right/left stick: speed"]);
         assert_eq!(names(&all[3..]), ["Up Down/left stick: jump"]);
         assert!(names(&[]).is_empty());
-        let by_camera = controls(&all, true, &Bindings::default()).into_iter().map(|c| format!("{}: {}", c.keys, c.does)).collect::<Vec<_>>();
+        let by_camera = controls(&all, true, &Bindings::default())
+            .into_iter()
+            .map(|c| format!("{}: {}", c.keys, c.does))
+            .collect::<Vec<_>>();
         assert_eq!(by_camera, ["W A S D: move", "Shift: run", "Space: jump"]);
     }
 }

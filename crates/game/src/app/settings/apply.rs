@@ -2,7 +2,7 @@
 
 use crate::app::input::bindings::Bindings;
 use crate::app::mode::AppSet;
-use crate::app::settings::{Display, Settings, Volumes, WindowKind};
+use crate::app::settings::values::{Display, Settings, Volumes, WindowKind};
 use bevy::prelude::*;
 use bevy::window::{MonitorSelection, PresentMode, PrimaryWindow, WindowMode};
 use bevy_marathon::look::Quality;

@@ -3,7 +3,7 @@
 //! A file that cannot be read is renamed, so that the next save does not overwrite what the user has written.
 
 use crate::app::notifications::Notifications;
-use crate::app::settings::Settings;
+use crate::app::settings::values::Settings;
 use bevy::prelude::*;
 use etcetera::BaseStrategy;
 use marathon_physics::budget;

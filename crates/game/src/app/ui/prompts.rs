@@ -4,7 +4,7 @@ use crate::app::input::actions::{Action, ActionPressed, KeysFor, Steer, Steering
 use crate::app::input::bindings::{Bindable, Bindings, Press};
 use crate::app::input::device::{Device, DeviceInUse};
 use crate::app::mode::{AppSet, Mode};
-use crate::app::settings::Settings;
+use crate::app::settings::values::Settings;
 use crate::app::stage::actors::{Actor, Focus};
 use crate::app::stage::scenario::Scenario;
 use crate::app::ui::glyphs::{Glyph, glyph};
@@ -52,8 +52,7 @@ pub enum Prompt {
 
 impl Prompt {
     /// All prompts, in their order.
-    pub const ALL: [Prompt; 6] =
-        [Prompt::Walk, Prompt::Turn, Prompt::Run, Prompt::Jump, Prompt::Flip, Prompt::Throw];
+    pub const ALL: [Prompt; 6] = [Prompt::Walk, Prompt::Turn, Prompt::Run, Prompt::Jump, Prompt::Flip, Prompt::Throw];
 
     /// Its name on the screen.
     pub fn name(self) -> &'static str {

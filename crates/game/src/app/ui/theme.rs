@@ -2,7 +2,7 @@
 
 use crate::app::input::actions::KeysFor;
 use crate::app::mode::AppSet;
-use crate::app::settings::{Detail, Settings, TEXT_SIZE};
+use crate::app::settings::values::{Detail, Settings, TEXT_SIZE};
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, Area, Color32, CornerRadius, FontFamily, FontId, Frame, Id, Margin, RichText, Ui};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
@@ -100,11 +100,7 @@ fn style(mut contexts: EguiContexts, mut done: Local<bool>) -> Result {
 }
 
 /// Scales text and bars to the picture, and to the size of text that the player has chosen.
-fn fit(
-    mut contexts: EguiContexts,
-    settings: Res<Settings>,
-    cameras: Query<&Camera, With<FollowCamera>>,
-) -> Result {
+fn fit(mut contexts: EguiContexts, settings: Res<Settings>, cameras: Query<&Camera, With<FollowCamera>>) -> Result {
     let ctx = contexts.ctx_mut()?;
     if let Some(size) = cameras.iter().next().and_then(Camera::logical_viewport_size) {
         let fits = (size.x / FULL[0]).min(size.y / FULL[1]).clamp(SMALLEST, 1.0);

@@ -26,16 +26,15 @@ pub struct Gate {
 struct Paints([Handle<StandardMaterial>; 3]);
 
 pub(super) fn plugin(app: &mut App) {
-    app.add_systems(OnEnter(Mode::Course), build).add_systems(
-        Update,
-        (follow, paint).chain().run_if(in_state(Mode::Course)).in_set(AppSet::Present),
-    );
+    app.add_systems(OnEnter(Mode::Course), build)
+        .add_systems(Update, (follow, paint).chain().run_if(in_state(Mode::Course)).in_set(AppSet::Present));
 }
 
 /// Builds the arches. They disappear with the mode.
 fn build(mut commands: Commands, mut meshes: ResMut<Assets<Mesh>>, mut materials: ResMut<Assets<StandardMaterial>>) {
     let mut paint = |color: Color| materials.add(StandardMaterial { base_color: color, ..default() });
-    let paints = [Color::srgb(0.93, 0.94, 0.96), Color::srgb(0.12, 0.42, 0.9), Color::srgb(1.0, 0.55, 0.15)].map(&mut paint);
+    let paints =
+        [Color::srgb(0.93, 0.94, 0.96), Color::srgb(0.12, 0.42, 0.9), Color::srgb(1.0, 0.55, 0.15)].map(&mut paint);
     let [height, depth, half] = SIZE;
     let post = meshes.add(Cuboid::new(THICK, height + depth, THICK));
     let beam = meshes.add(Cuboid::new(THICK, 3.0 * THICK, 2.0 * half + THICK));

@@ -332,8 +332,7 @@ fn insert(begun: &Transaction<'_>, run: &Run) -> rusqlite::Result<Option<i64>> {
 }
 
 fn place(connection: &Connection, course: &Course, distance: f64) -> rusqlite::Result<Place> {
-    let query =
-        "SELECT count(*) FILTER (WHERE distance > :distance) + 1, count(*), max(distance), min(distance),
+    let query = "SELECT count(*) FILTER (WHERE distance > :distance) + 1, count(*), max(distance), min(distance),
                 min(seconds) FILTER (WHERE ended = 'through') FROM runs
          WHERE agent = :agent AND course = :kind AND difficulty = :difficulty AND part = :part";
     let Course { agent, kind, difficulty, role } = course;

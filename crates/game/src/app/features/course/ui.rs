@@ -12,7 +12,7 @@ use crate::app::stage::course::PlayerRole;
 use crate::app::stage::loaded::LoadedPolicy;
 use crate::app::stage::recording::PlayRecording;
 use crate::app::stage::scenario::{LoadScenario, Scenario};
-use crate::app::ui::menu::Overlay;
+use crate::app::ui::menu::state::Overlay;
 use crate::app::ui::theme::{ACCENT, BAD, FAINT, Hud, TEXT, UiSet, line, panel, text};
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, Ui};

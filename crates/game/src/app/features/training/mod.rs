@@ -31,7 +31,13 @@ pub(super) fn plugin(app: &mut App) {
         .add_systems(Update, (discard, control).chain().in_set(AppSet::Input).after(ControlSet))
         .add_systems(
             Update,
-            (sync_run.run_if(in_state(Mode::Learn)), follow_pause, keep_pace.run_if(resource_exists::<IsVideo>), apply_policy, log)
+            (
+                sync_run.run_if(in_state(Mode::Learn)),
+                follow_pause,
+                keep_pace.run_if(resource_exists::<IsVideo>),
+                apply_policy,
+                log,
+            )
                 .chain()
                 .in_set(AppSet::Simulate)
                 .after(spawn),

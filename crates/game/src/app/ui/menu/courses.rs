@@ -6,7 +6,7 @@ use crate::app::stage::course::PlayerRole;
 use crate::app::stage::policies::ShippedPolicies;
 use crate::app::stage::scenario::Scenario;
 use crate::app::stage::selection::{fit_to_course, fresh_start};
-use crate::app::ui::menu::draw::Choice;
+use crate::app::ui::menu::choice::Choice;
 use crate::app::ui::menu::window::Items;
 use crate::app::ui::theme::{FAINT, text};
 use bevy_egui::egui::{Button, RichText, Slider, Ui};

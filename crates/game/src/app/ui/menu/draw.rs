@@ -4,47 +4,29 @@ use crate::app::input::actions::{Action, ActionRequested};
 use crate::app::input::bindings::Bindings;
 use crate::app::input::device::DeviceInUse;
 use crate::app::input::rebind::Rebinding;
-use crate::app::settings::Settings;
+use crate::app::settings::resolution::ShowSet;
+use crate::app::settings::values::Settings;
 use crate::app::stage::policies::ShippedPolicies;
 use crate::app::stage::recording::PlayRecording;
 use crate::app::stage::scenario::Scenario;
+use crate::app::ui::menu::choice::Choice;
 use crate::app::ui::menu::pictures::Pictures;
 use crate::app::ui::menu::setup::Draft;
+use crate::app::ui::menu::state::{Menu, Screen};
 use crate::app::ui::menu::window::Items;
-use crate::app::ui::menu::{Menu, Screen, courses, home, keys, options, replays, setup, window};
+use crate::app::ui::menu::{courses, home, keys, options, replays, setup, window};
 use crate::app::ui::question::{self, Asked, AtStake, Question, StartConfirmed};
 use crate::app::ui::theme::UiSet;
 use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Color32};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
-use std::path::PathBuf;
 
 /// Widths of the screens, points.
 const WIDTHS: [f32; 2] = [660.0, 580.0];
 
-/// The player's choice on a screen.
-pub enum Choice {
-    /// Nothing yet.
-    Stay,
-    /// Another screen over this one.
-    Show(Screen),
-    /// The screen below.
-    Back,
-    /// The game.
-    Close,
-    /// A scenario.
-    Start(Scenario),
-    /// A recording.
-    Replay(PathBuf),
-    /// An action, in the game.
-    Do(Action),
-    /// The end of the game.
-    Quit,
-}
-
 pub(super) fn plugin(app: &mut App) {
-    app.add_systems(EguiPrimaryContextPass, draw.in_set(UiSet::Windows).before(question::draw));
+    app.add_systems(EguiPrimaryContextPass, draw.in_set(UiSet::Windows).after(ShowSet).before(question::draw));
 }
 
 /// What the choices change.
@@ -152,6 +134,5 @@ fn draw(
 
 /// Darkens the picture behind a menu.
 fn dim(ctx: &egui::Context) {
-    let layer = egui::LayerId::new(egui::Order::Background, egui::Id::new("dim"));
-    ctx.layer_painter(layer).rect_filled(ctx.content_rect(), 0.0, Color32::from_black_alpha(110));
+    ctx.layer_painter(egui::LayerId::background()).rect_filled(ctx.content_rect(), 0.0, Color32::from_black_alpha(110));
 }

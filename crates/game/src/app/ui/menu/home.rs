@@ -5,9 +5,9 @@ use crate::app::mode::Mode;
 use crate::app::stage::policies::ShippedPolicies;
 use crate::app::stage::scenario::Scenario;
 use crate::app::stage::selection::fresh_start;
-use crate::app::ui::menu::Screen;
-use crate::app::ui::menu::draw::Choice;
+use crate::app::ui::menu::choice::Choice;
 use crate::app::ui::menu::pictures::{Picture, Pictures};
+use crate::app::ui::menu::state::Screen;
 use crate::app::ui::menu::window::Items;
 use crate::app::ui::theme::{FAINT, TEXT, text};
 use bevy_egui::egui::{self, Button, Image, Ui, Vec2};
@@ -55,11 +55,9 @@ pub fn main(
     }
     ui.separator();
     ui.horizontal_wrapped(|ui| {
-        for (label, next) in [
-            ("Settings", Choice::Show(Screen::Settings)),
-            ("Keys", Choice::Show(Screen::Keys)),
-            ("Quit", Choice::Quit),
-        ] {
+        for (label, next) in
+            [("Settings", Choice::Show(Screen::Settings)), ("Keys", Choice::Show(Screen::Keys)), ("Quit", Choice::Quit)]
+        {
             if items.button(ui, label).clicked() {
                 choice = next;
             }

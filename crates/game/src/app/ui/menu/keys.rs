@@ -4,7 +4,7 @@ use crate::app::input::bindings::{Bindable, Bindings};
 use crate::app::input::device::Device;
 use crate::app::input::key_names::{button_name, key_name};
 use crate::app::input::rebind::Rebinding;
-use crate::app::ui::menu::draw::Choice;
+use crate::app::ui::menu::choice::Choice;
 use crate::app::ui::menu::window::Items;
 use crate::app::ui::theme::{ACCENT, FAINT, TEXT, text};
 use bevy::prelude::*;

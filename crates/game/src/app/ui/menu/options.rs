@@ -1,11 +1,11 @@
 //! The screen of the settings, in groups. A change takes effect at once, except for the skin.
 
 use crate::app::input::device::PadShapes;
-use crate::app::settings::{
+use crate::app::settings::values::{
     Detail, FIELD, QualityChoice, SCALE, SENSITIVITY, Settings, SkinChoice, TEXT_SIZE, VOLUME, WindowKind,
 };
-use crate::app::ui::menu::Screen;
-use crate::app::ui::menu::draw::Choice;
+use crate::app::ui::menu::choice::Choice;
+use crate::app::ui::menu::state::Screen;
 use crate::app::ui::menu::window::Items;
 use crate::app::ui::theme::{ACCENT, text};
 use bevy::prelude::*;
@@ -109,10 +109,11 @@ fn skin(rows: &mut Rows<'_>, skin: &mut SkinChoice) {
         SkinChoice::File(path) => path.display().to_string(),
         _ => String::new(),
     };
-    rows.choice("Skin, from the next start on", skin, &[
-        (SkinChoice::Automatic, "automatic"),
-        (SkinChoice::Shapes, "shapes of the physics"),
-    ]);
+    rows.choice(
+        "Skin, from the next start on",
+        skin,
+        &[(SkinChoice::Automatic, "automatic"), (SkinChoice::Shapes, "shapes of the physics")],
+    );
     rows.ui.label("Skin of your own");
     let edit = TextEdit::singleline(&mut file).hint_text(RichText::new("file.glb")).desired_width(190.0);
     if rows.items.add(rows.ui, edit).changed() {

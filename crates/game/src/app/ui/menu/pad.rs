@@ -1,7 +1,7 @@
 //! Gamepads in menus: the D-pad and the left stick move the focus, one button activates an item, another goes back.
 
 use crate::app::input::actions::{Action, ActionRequested, KeysFor};
-use crate::app::input::bindings::ReadSet;
+use crate::app::input::read::ReadSet;
 use crate::app::input::rebind::{RebindSet, Rebinding};
 use bevy::input::gamepad::{Gamepad, GamepadButton};
 use bevy::prelude::*;

@@ -1,7 +1,7 @@
 //! The screen of the recordings in the current folder.
 
 use crate::app::input::actions::Action;
-use crate::app::ui::menu::draw::Choice;
+use crate::app::ui::menu::choice::Choice;
 use crate::app::ui::menu::window::Items;
 use crate::app::ui::theme::{FAINT, text};
 use bevy_egui::egui::{Button, RichText, Ui};
