@@ -13,7 +13,7 @@ mod skin;
 
 pub use body::{LookPlugin, Tint, joint_places};
 pub use camera::{CameraMode, FollowCamera, FollowCameraPlugin};
-pub use ghost::{ErrorColors, Ghost, GhostPlugin, part_errors};
+pub use ghost::{ErrorColors, ErrorPalette, Ghost, GhostPlugin, part_errors};
 pub use marks::{Marks, MarksPlugin, commanded_velocity};
 pub use quality::Quality;
 pub use scenery::SceneryPlugin;

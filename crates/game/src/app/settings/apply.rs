@@ -5,12 +5,12 @@ use crate::app::mode::AppSet;
 use crate::app::settings::values::{Display, Settings, Volumes, WindowKind};
 use bevy::prelude::*;
 use bevy::window::{MonitorSelection, PresentMode, PrimaryWindow, WindowMode};
-use bevy_marathon::look::Quality;
+use bevy_marathon::look::{ErrorPalette, Quality};
 
 pub(super) fn plugin(app: &mut App) {
     app.init_resource::<Volumes>().init_resource::<AutomaticQuality>().add_systems(
         Update,
-        (keep_bindings, (set_volumes, set_display).run_if(resource_changed::<Settings>))
+        (keep_bindings, (set_volumes, set_colors, set_display).run_if(resource_changed::<Settings>))
             .chain()
             .in_set(AppSet::Present),
     );
@@ -42,6 +42,11 @@ fn keep_bindings(bindings: Res<Bindings>, mut settings: ResMut<Settings>) {
 
 fn set_volumes(settings: Res<Settings>, mut volumes: ResMut<Volumes>) {
     volumes.set_if_neq(settings.sound);
+}
+
+fn set_colors(settings: Res<Settings>, mut palette: ResMut<ErrorPalette>) {
+    let safe = settings.interface.safe_colors;
+    palette.set_if_neq(if safe { ErrorPalette::BlueToOrange } else { ErrorPalette::GreenToRed });
 }
 
 /// Applies changes of window and quality. What the game started with stays: the command line may have set it.

@@ -127,7 +127,7 @@ pub struct CameraSection {
 
 impl Default for CameraSection {
     fn default() -> Self {
-        CameraSection { field_of_view: 45.0, sensitivity: 1.0, invert_y: false, reduced_motion: false }
+        CameraSection { field_of_view: 60.0, sensitivity: 1.0, invert_y: false, reduced_motion: false }
     }
 }
 
