@@ -27,7 +27,7 @@ fn press(app: &mut App, key: KeyCode) {
     devices::key(app, key, ButtonState::Released);
 }
 
-/// What the character in focus has done, as its physics has it.
+/// The motion of the character in focus, as its physics has it.
 #[derive(Debug, Default)]
 struct Seen {
     walked: f64,
@@ -191,7 +191,7 @@ fn the_menu_key_stops_the_simulation_and_goes_back_into_play() {
 
 #[test]
 fn a_gamepad_alone_goes_through_the_menus() {
-    let mut app = windowless::game(&[], FRAME, |_| ());
+    let mut app = windowless::game_in(Some(Window::default()), &[], FRAME, |_| ());
     let pad = devices::pad(&mut app);
     let screen = |app: &App| app.world().resource::<Menu>().screen();
     let tap = |app: &mut App, button| {
@@ -230,7 +230,7 @@ fn a_gamepad_alone_goes_through_the_menus() {
 
 #[test]
 fn a_taken_key_or_button_asks_before_it_is_bound() {
-    let mut app = windowless::game(&["hopper"], FRAME, |_| ());
+    let mut app = windowless::game_in(Some(Window::default()), &["hopper"], FRAME, |_| ());
     let pad = devices::pad(&mut app);
     app.world_mut().resource_mut::<Menu>().show(Screen::Keys);
     frames(&mut app, 2);

@@ -64,7 +64,8 @@ impl ErrorPalette {
                 Color::srgb((2.0 * far).min(1.0) * 0.86, (2.0 - 2.0 * far).min(1.0) * 0.68, 0.10)
             }
             ErrorPalette::BlueToOrange => {
-                let [near, far_out, middle] = [Vec3::new(0.0, 0.32, 0.75), Vec3::new(0.90, 0.45, 0.0), Vec3::splat(0.72)];
+                let [near, far_out, middle] =
+                    [Vec3::new(0.0, 0.32, 0.75), Vec3::new(0.90, 0.45, 0.0), Vec3::splat(0.72)];
                 let [r, g, b] = match far < 0.5 {
                     true => near.lerp(middle, 2.0 * far),
                     false => middle.lerp(far_out, 2.0 * far - 1.0),

@@ -14,6 +14,7 @@ use crate::app::stage::actors::ShownMarks;
 use crate::app::stage::policies::ShippedPolicies;
 use crate::app::stage::recording::Recording;
 use crate::app::stage::scenario::Scenario;
+use crate::app::stage::selection::fresh_start;
 use crate::app::stage::skin::SkinFile;
 use crate::app::ui::menu::state::{Menu, Screen};
 use crate::app::ui::theme::Hud;
@@ -70,6 +71,9 @@ impl GamePlugin {
         }
         if args.mlagents_port.is_some() || args.watch_stream {
             scenario.mode = Mode::Outside;
+        }
+        if args.opens_menu() {
+            scenario = fresh_start(&scenario, Mode::Watch, &shipped);
         }
         let skin = args.skin.as_deref().map(|skin| SkinFile::read(skin, args.mapping.as_deref())).transpose()?;
         // videos and tests show all numbers, and do not depend on what a user has set

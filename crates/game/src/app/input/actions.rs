@@ -101,7 +101,7 @@ pub enum Steer {
     Flip,
 }
 
-/// What keys and buttons are for.
+/// The purpose of keys and buttons.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum KeysFor {
     /// The characters and the picture.

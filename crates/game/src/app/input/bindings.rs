@@ -185,13 +185,13 @@ impl Bindings {
         self.row(Bindable::Steer(steer)).button
     }
 
-    /// What has a key or button that `what` would take away.
+    /// The one that has a key or button, which `what` would take away.
     pub fn taken(&self, what: Bindable, press: Press) -> Option<Bindable> {
         let competing = self.rows.iter().filter(|row| row.what != what && row.what.competes(what));
         competing.filter(|row| row.has(press)).map(|row| row.what).next()
     }
 
-    /// Binds a key or button. What had it gets the former one, so that nothing loses its key.
+    /// Binds a key or button. The one that had it gets the former one, so that nothing loses its key.
     pub fn bind(&mut self, what: Bindable, press: Press) {
         let old = *self.row(what);
         let taken = self.taken(what, press);

@@ -4,6 +4,7 @@ pub mod actions;
 pub mod bindings;
 pub mod camera;
 pub mod control;
+pub mod controls;
 pub mod device;
 pub mod key_names;
 pub mod read;

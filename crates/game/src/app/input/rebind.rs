@@ -18,7 +18,7 @@ pub enum Rebinding {
     Idle,
     /// The next press of the device is bound.
     Waiting {
-        /// What gets it.
+        /// The one that gets it.
         what: Bindable,
         /// The device.
         device: Device,
@@ -27,11 +27,11 @@ pub enum Rebinding {
     },
     /// The press is taken: [`Rebinding::swap`] or [`Rebinding::cancel`].
     Taken {
-        /// What would get it.
+        /// The one that would get it.
         what: Bindable,
         /// The key or button.
         press: Press,
-        /// What has it.
+        /// The one that has it.
         by: Bindable,
     },
 }
@@ -60,7 +60,7 @@ impl Rebinding {
         *self = Rebinding::Idle;
     }
 
-    /// Binds the press that is taken. What has it gets the former one.
+    /// Binds the press that is taken. The one that has it gets the former one.
     pub fn swap(&mut self, bindings: &mut Bindings) {
         if let Rebinding::Taken { what, press, .. } = *self {
             bindings.bind(what, press);

@@ -49,7 +49,7 @@ fn set_colors(settings: Res<Settings>, mut palette: ResMut<ErrorPalette>) {
     palette.set_if_neq(if safe { ErrorPalette::BlueToOrange } else { ErrorPalette::GreenToRed });
 }
 
-/// Applies changes of window and quality. What the game started with stays: the command line may have set it.
+/// Applies changes of window and quality. The values of the start stay: the command line may have set them.
 fn set_display(
     (settings, automatic): (Res<Settings>, Res<AutomaticQuality>),
     mut windows: Query<&mut Window, With<PrimaryWindow>>,

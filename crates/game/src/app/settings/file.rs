@@ -18,7 +18,7 @@ const QUIET: f32 = 0.5;
 #[derive(Resource, Clone, Debug)]
 pub struct SettingsFile(pub PathBuf);
 
-/// What a settings file has, and what the player must know about it.
+/// The settings of a file, and warnings about it.
 #[derive(Debug, Default)]
 pub struct Loaded {
     /// The settings.

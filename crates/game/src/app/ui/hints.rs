@@ -3,7 +3,7 @@
 
 use crate::app::input::actions::{Action, Steering};
 use crate::app::input::bindings::Bindings;
-use crate::app::input::steering::{Control, controls};
+use crate::app::input::controls::{Control, controls};
 use crate::app::stage::actors::{Actor, Focus};
 use crate::app::stage::scenario::Scenario;
 use crate::app::ui::rewards;

@@ -3,9 +3,9 @@
 use crate::app::mode::{AppSet, Mode};
 use crate::app::stage::actors::{Actor, Focus};
 use crate::app::stage::scenario::Scenario;
-use crate::app::ui::theme::{ACCENT, BAD, FAINT, Hud, TEXT, UiSet, card, line, spaced, text};
+use crate::app::ui::theme::{ACCENT, BAD, FAINT, Hud, TEXT, UiSet, card, line, spaced, status_id, text};
 use bevy::prelude::*;
-use bevy_egui::egui::{self, Align2, Area, Color32, Id, Sense, Ui};
+use bevy_egui::egui::{self, Align2, Area, Color32, Sense, Ui};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
 use bevy_marathon::look::commanded_velocity;
 use bevy_marathon::{AgentCommand, Anatomy, Episode, Marathon};
@@ -137,7 +137,7 @@ pub fn draw(
     *smooth = if *smooth > 0.0 { *smooth + 0.05 * (delta - *smooth) } else { delta };
     let actor = actors.iter().find(|(a, ..)| a.0 == focus.0);
     if let Some((_, anatomy, episode, command)) = actor {
-        Area::new(Id::new("who")).anchor(Align2::LEFT_TOP, [14.0, 14.0]).interactable(false).show(&ctx, |ui| {
+        Area::new(status_id()).anchor(Align2::LEFT_TOP, [14.0, 14.0]).interactable(false).show(&ctx, |ui| {
             card().show(ui, |ui| {
                 let of = if scenario.agents > 1 {
                     format!("  {} of {}", focus.0 + 1, scenario.agents)

@@ -23,6 +23,8 @@ pub const BAD: Color32 = Color32::from_rgb(255, 106, 96);
 const FULL: [f32; 2] = [1000.0, 600.0];
 /// Smallest scale at which text can be read.
 const SMALLEST: f32 = 0.66;
+/// Smallest picture in which larger text fits, points: in a small window, text grows no further.
+const LEAST: [f32; 2] = [760.0, 430.0];
 
 /// The text and bars over the picture.
 #[derive(Resource, Clone, Copy, Debug)]
@@ -105,7 +107,8 @@ fn fit(mut contexts: EguiContexts, settings: Res<Settings>, cameras: Query<&Came
     if let Some(size) = cameras.iter().next().and_then(Camera::logical_viewport_size) {
         let fits = (size.x / FULL[0]).min(size.y / FULL[1]).clamp(SMALLEST, 1.0);
         let chosen = settings.interface.text_size.clamp(*TEXT_SIZE.start(), *TEXT_SIZE.end());
-        ctx.set_zoom_factor(fits * chosen);
+        let most = (size.x / LEAST[0]).min(size.y / LEAST[1]).max(fits);
+        ctx.set_zoom_factor((fits * chosen).min(most));
     }
     Ok(())
 }
@@ -120,9 +123,20 @@ pub fn panel_id() -> Id {
     Id::new("panel")
 }
 
-/// Draws a card at the upper right: the panel of the current mode.
+/// The name of the area of the card at the upper left.
+pub fn status_id() -> Id {
+    Id::new("who")
+}
+
+/// Draws a card at the upper right: the panel of the current mode. Where there is no room for it, it is below the card at the
+/// left.
 pub fn panel(ctx: &egui::Context, interactable: bool, draw: impl FnOnce(&mut Ui)) {
-    let area = Area::new(panel_id()).anchor(Align2::RIGHT_TOP, [-14.0, 14.0]).interactable(interactable);
+    let rect = |id| ctx.memory(|memory| memory.area_rect(id));
+    let status = rect(status_id());
+    let width = rect(panel_id()).map_or(0.0, |panel| panel.width());
+    let crowded = status.filter(|status| status.right() + width + 22.0 > ctx.content_rect().right());
+    let top = crowded.map_or(14.0, |status| status.bottom() + 8.0);
+    let area = Area::new(panel_id()).anchor(Align2::RIGHT_TOP, [-14.0, top]).interactable(interactable);
     area.show(ctx, |ui| card().show(ui, draw));
 }
 

@@ -54,6 +54,7 @@ fn build(mut commands: Commands, mut meshes: ResMut<Assets<Mesh>>, mut materials
 }
 
 /// Puts the arches over the track of the character in focus. A course that the player builds has none.
+#[allow(clippy::type_complexity, reason = "a query names what it reads")]
 fn follow(
     (focus, scenario): (Res<Focus>, Res<Scenario>),
     actors: Query<(&Actor, &Transform), (With<Ragdoll>, Without<Gate>)>,

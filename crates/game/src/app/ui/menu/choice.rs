@@ -1,4 +1,4 @@
-//! What a player chooses on a screen.
+//! The choices of a player on a screen.
 
 use crate::app::input::actions::Action;
 use crate::app::stage::scenario::Scenario;

@@ -29,7 +29,7 @@ pub(super) fn plugin(app: &mut App) {
     app.add_systems(EguiPrimaryContextPass, draw.in_set(UiSet::Windows).after(ShowSet).before(question::draw));
 }
 
-/// What the choices change.
+/// The resources and messages that choices change.
 #[derive(SystemParam)]
 struct Effects<'w> {
     question: ResMut<'w, Question>,

@@ -1,4 +1,4 @@
-//! What is open of the menus, what that does to time and keys, and the scenarios that they start.
+//! The open menus, their effect on time and keys, and the scenarios that they start.
 
 use crate::app::input::actions::{Action, ActionPressed, KeysFor};
 use crate::app::input::control::ControlSet;
@@ -104,7 +104,10 @@ pub(super) fn plugin(app: &mut App) {
             PreUpdate,
             (report.in_set(ReportSet), cancel_rebinding.before(RebindSet).before(ReadSet), direct_keys.before(ReadSet)),
         )
-        .add_systems(Update, (toggle, start.before(ControlSet), hold_time.after(ControlSet)).in_set(AppSet::Input));
+        .add_systems(
+            Update,
+            (toggle, start.before(ControlSet), hold_time.after(toggle).after(ControlSet)).in_set(AppSet::Input),
+        );
 }
 
 fn report(menu: Res<Menu>, mut at_stake: ResMut<AtStake>) {
