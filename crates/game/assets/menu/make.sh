@@ -8,7 +8,7 @@ shot() {
   shift
   "$game" "$@" --no-hud --quality high --size 208x117 --seconds 0.1 --fps 10 --record "$name.png"
 }
-shot play MarathonManController --skin marathon_man --input 0.2-9:key:w --input 0.2-9:key:shift --start 2.4
+shot play MarathonManController --skin marathon_man --input 0.2-9:pad:left-y=1 --start 2.4
 shot courses TerrainMarathonMan --mode course --course stairs --skin marathon_man --start 6
 shot learn hopper --agents 4 --start 1.2
 shot motion MarathonManBackflip --mode imitate --action 0:ghost --start 1
