@@ -1,8 +1,5 @@
 //! Settings are kept in one readable file; a bad file is renamed and reported. All screens fit windows of every size.
 
-#[path = "../../bevy_marathon/tests/common/devices.rs"]
-#[allow(dead_code, reason = "one device is enough here")]
-mod devices;
 #[path = "common/windowless.rs"]
 mod windowless;
 
@@ -79,8 +76,11 @@ fn a_bad_file_is_renamed_and_reported_with_its_place() -> Result<(), Box<dyn Err
     Ok(())
 }
 
-/// The visible areas over the picture, with their names, and the room that they have.
-fn areas(app: &mut App) -> Result<(Vec<(String, egui::Rect)>, egui::Rect), Box<dyn Error>> {
+/// An area over the picture, with its name.
+type Named = (String, egui::Rect);
+
+/// The visible areas over the picture, and the room that they have.
+fn areas(app: &mut App) -> Result<(Vec<Named>, egui::Rect), Box<dyn Error>> {
     let mut contexts = app.world_mut().query_filtered::<&mut EguiContext, With<PrimaryEguiContext>>();
     let ctx = contexts.single_mut(app.world_mut())?.get_mut().clone();
     let layers: Vec<_> = ctx.memory(|memory| memory.areas().visible_layer_ids().into_iter().collect());

@@ -148,8 +148,9 @@ fn stick(painter: &Painter, rect: Rect, [x, y]: [f32; 2]) {
     painter.circle(center + 0.35 * radius * push, 0.5 * radius, EDGE, Stroke::NONE);
     painter.text(center + 0.35 * radius * push, Align2::CENTER_CENTER, "L", font(0.36 * rect.height()), CAP);
     if push != Vec2::ZERO {
-        let (tip, across) = (center + 0.98 * radius * push, vec2(-push.y, push.x));
-        let base = tip - 0.22 * radius * push;
+        let way = push.normalized();
+        let (tip, across) = (center + 0.98 * radius * way, vec2(-way.y, way.x));
+        let base = tip - 0.22 * radius * way;
         let corners = vec![tip, base + 0.25 * radius * across, base - 0.25 * radius * across];
         painter.add(Shape::convex_polygon(corners, TEXT, Stroke::NONE));
     }

@@ -25,7 +25,7 @@ impl Rows<'_> {
 
     fn slider(&mut self, name: &str, x: &mut f32, range: RangeInclusive<f32>, step: f64) {
         self.ui.label(name);
-        self.items.add(self.ui, Slider::new(x, range).step_by(step));
+        self.items.add(self.ui, Slider::new(x, range).step_by(step).max_decimals(2));
         self.ui.end_row();
     }
 

@@ -1,6 +1,7 @@
 //! The window of a screen, and its items, which a gamepad and the keyboard reach in turn.
 
-use bevy_egui::egui::{self, Align2, Button, Id, Response, RichText, ScrollArea, Ui, Vec2, Widget};
+use crate::app::ui::theme::ACCENT;
+use bevy_egui::egui::{self, Align2, Button, Id, Response, RichText, ScrollArea, Stroke, StrokeKind, Ui, Vec2, Widget};
 
 /// Free space beside and above the window, points.
 const MARGIN: Vec2 = Vec2::new(44.0, 64.0);
@@ -18,6 +19,10 @@ impl Items {
         let response = ui.add(widget);
         if std::mem::take(&mut self.fresh) {
             response.request_focus();
+        }
+        if ui.memory(|memory| memory.has_focus(response.id)) {
+            let stroke = Stroke::new(2.0, ACCENT);
+            ui.painter().rect_stroke(response.rect.expand(1.0), 3.0, stroke, StrokeKind::Outside);
         }
         if response.gained_focus() {
             response.scroll_to_me(None);
