@@ -11,7 +11,7 @@ use bevy::prelude::*;
 use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat, TextureUsages};
 use bevy::window::PrimaryWindow;
 use bevy_egui::egui::{Color32, LayerId, Pos2, Rect};
-use bevy_egui::{EguiContexts, EguiPrimaryContextPass, EguiTextureHandle, PrimaryEguiContext};
+use bevy_egui::{EguiContexts, EguiGlobalSettings, EguiPrimaryContextPass, EguiTextureHandle, PrimaryEguiContext};
 use bevy_marathon::look::FollowCamera;
 
 /// The image that the scene is drawn into.
@@ -41,11 +41,14 @@ fn divide(
     windows: Query<(), With<PrimaryWindow>>,
     cameras: Query<Entity, (With<FollowCamera>, With<PrimaryEguiContext>)>,
     mut images: ResMut<Assets<Image>>,
+    mut egui: ResMut<EguiGlobalSettings>,
 ) {
     let Some(camera) = cameras.iter().next() else { return };
     if settings.display.resolution_scale >= *SCALE.end() || windows.is_empty() {
         return;
     }
+    // else the camera of the scene would get its context again
+    egui.auto_create_primary_context = false;
     commands.entity(camera).remove_with_requires::<PrimaryEguiContext>();
     commands.spawn((Camera2d, Msaa::Off, PrimaryEguiContext));
     commands.insert_resource(SmallPicture { image: images.add(blank(UVec2::ONE)), size: UVec2::ONE });

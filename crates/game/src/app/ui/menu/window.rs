@@ -57,6 +57,8 @@ pub fn show(ctx: &egui::Context, title: &str, width: f32, draw: impl FnOnce(&mut
         // each screen scrolls by itself
         ScrollArea::vertical().id_salt(title).max_height(room.y - 24.0).show(ui, |ui| {
             ui.set_width(ui.available_width());
+            // room for the frame of the first item
+            ui.add_space(4.0);
             draw(ui);
         });
     });
