@@ -5,11 +5,12 @@
 #   release   wheels, programs and archives of all platforms that this system can build, tried as a user would
 #   aarch64   the Python tests with the wheel for Arm, under qemu
 #   crates    packs and compiles the published crates
+#   player    twenty random players in the game, ten minutes of its time each
 set -euo pipefail
 cd "$(dirname "$0")/.."
 parts=("$@")
 if [ $# = 0 ]; then
-  parts=(fuzz release aarch64 crates)
+  parts=(fuzz release aarch64 crates player)
 fi
 for part in "${parts[@]}"; do
   echo "tests/long.sh: $part" >&2
@@ -24,6 +25,7 @@ for part in "${parts[@]}"; do
       tests/aarch64.sh release/dist/marathon_rl-*manylinux*aarch64*.whl
       ;;
     crates) release/publish.sh --dry-run ;;
-    *) echo "tests/long.sh: no part '$part'; there are fuzz, release, aarch64 and crates" >&2 && exit 2 ;;
+    player) cargo test --release --workspace --test a_stranger_plays -- --ignored --nocapture ;;
+    *) echo "tests/long.sh: no part '$part'; there are fuzz, release, aarch64, crates and player" >&2 && exit 2 ;;
   esac
 done

@@ -7,7 +7,7 @@ use bevy::input::gamepad::GamepadButton;
 use bevy::input::{ButtonState, InputPlugin};
 use bevy::prelude::*;
 use devices::{key, pull};
-use marathon_game::app::{Action, ActionPressed, Bindings, KeysPlugin};
+use marathon_game::app::{Action, ActionPressed, Bindable, Bindings, KeysPlugin, Press};
 
 #[derive(Resource, Default)]
 struct Done(Vec<Action>);
@@ -32,7 +32,7 @@ fn buttons_become_actions_once_per_press() {
     app.update();
     app.update();
     pull(&mut app, pad, GamepadButton::South, 0.0);
-    pull(&mut app, pad, GamepadButton::East, 1.0);
+    pull(&mut app, pad, GamepadButton::RightTrigger2, 1.0);
     pull(&mut app, pad, GamepadButton::Start, 1.0);
     assert_eq!(app.world().resource::<Done>().0, [Action::Push, Action::Throw, Action::Menu]);
 }
@@ -40,7 +40,7 @@ fn buttons_become_actions_once_per_press() {
 #[test]
 fn keys_can_be_changed() {
     let (mut app, _) = app();
-    app.world_mut().resource_mut::<Bindings>().bind(Action::Push, KeyCode::KeyO);
+    app.world_mut().resource_mut::<Bindings>().bind(Bindable::Action(Action::Push), Press::Key(KeyCode::KeyO));
     key(&mut app, KeyCode::KeyO, ButtonState::Pressed);
     app.update();
     assert_eq!(app.world().resource::<Done>().0, [Action::Push]);

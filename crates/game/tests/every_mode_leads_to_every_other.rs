@@ -108,7 +108,7 @@ fn faults(app: &mut App, mode: Mode) -> Vec<String> {
     check(mode != Mode::Course || *world.resource::<Perturbations>() == Perturbations::default(), "the physics");
     let free = |actor: &EntityRef| actor.get::<AgentCommand>().is_none_or(|command| command.values().is_none());
     check(with(app, free), "a character is still steered");
-    check(!world.resource::<Menu>().open, "the menu is open");
+    check(!world.resource::<Menu>().is_open(), "the menu is open");
     faults
 }
 

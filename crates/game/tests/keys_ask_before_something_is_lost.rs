@@ -8,7 +8,9 @@ mod windowless;
 
 use bevy::input::ButtonState;
 use bevy::prelude::*;
-use marathon_game::app::{Action, Asked, Bindings, Menu, Mode, Question, Rebinding, Scenario, TrainingRun};
+use marathon_game::app::{
+    Action, Asked, Bindable, Bindings, Device, Menu, Mode, Question, Rebinding, Scenario, Screen, TrainingRun,
+};
 use std::error::Error;
 use std::time::{Duration, Instant};
 use windowless::frames;
@@ -30,12 +32,12 @@ fn asked(app: &App) -> Option<Asked> {
 fn quitting_asks_while_the_menu_is_open() {
     let mut app = app(&["hopper"]);
     press(&mut app, KeyCode::Escape);
-    assert!(app.world().resource::<Menu>().open);
+    assert!(app.world().resource::<Menu>().is_open());
     press(&mut app, KeyCode::KeyQ);
     assert_eq!((asked(&app), app.should_exit()), (Some(Asked::Action(Action::Quit)), None));
     // no
     press(&mut app, KeyCode::Escape);
-    assert_eq!((asked(&app), app.should_exit(), app.world().resource::<Menu>().open), (None, None, true));
+    assert_eq!((asked(&app), app.should_exit(), app.world().resource::<Menu>().is_open()), (None, None, true));
     press(&mut app, KeyCode::KeyQ);
     devices::key(&mut app, KeyCode::KeyQ, ButtonState::Pressed);
     assert!(app.should_exit().is_some_and(|exit| exit.is_success()));
@@ -71,7 +73,7 @@ fn a_policy_that_learns_and_a_recording_are_not_lost() -> Result<(), Box<dyn Err
         assert!(asked(&app).is_some() && app.should_exit().is_none(), "{key:?}");
         press(&mut app, KeyCode::Escape);
         assert!(asked(&app).is_none() && app.world().get_resource::<TrainingRun>().is_some(), "{key:?}");
-        assert!(!app.world().resource::<Menu>().open, "{key:?}: Esc answers");
+        assert!(!app.world().resource::<Menu>().is_open(), "{key:?}: Esc answers");
     }
     // yes, after saving
     press(&mut app, KeyCode::KeyL);
@@ -110,13 +112,16 @@ fn a_policy_that_learns_and_a_recording_are_not_lost() -> Result<(), Box<dyn Err
 fn esc_leaves_a_binding_as_it_is_and_a_closed_menu_mutes_no_key() {
     let mut app = app(&["hopper"]);
     press(&mut app, KeyCode::Escape);
-    app.world_mut().resource_mut::<Rebinding>().0 = Some(Action::Push);
+    let push = Bindable::Action(Action::Push);
+    app.world_mut().resource_mut::<Menu>().show(Screen::Keys);
+    app.world_mut().resource_mut::<Rebinding>().start(push, Device::Keyboard);
     press(&mut app, KeyCode::Escape);
     assert_eq!(app.world().resource::<Bindings>(), &Bindings::default());
-    assert!(app.world().resource::<Rebinding>().0.is_none() && app.world().resource::<Menu>().open);
-    // the menu's button closes it while it waits for a key
-    app.world_mut().resource_mut::<Rebinding>().0 = Some(Action::Push);
-    app.world_mut().resource_mut::<Menu>().open = false;
+    assert_eq!(*app.world().resource::<Rebinding>(), Rebinding::Idle);
+    assert_eq!(app.world().resource::<Menu>().screen(), Some(Screen::Keys));
+    // the menu closes while it waits for a key
+    app.world_mut().resource_mut::<Rebinding>().start(push, Device::Keyboard);
+    app.world_mut().resource_mut::<Menu>().close();
     frames(&mut app, 2);
     press(&mut app, KeyCode::Enter);
     assert!(app.world().resource::<Time<Virtual>>().is_paused(), "keys are heard");

@@ -87,6 +87,28 @@ fn runs_have_places_on_their_course() -> Result<(), Box<dyn Error>> {
 }
 
 #[test]
+fn the_best_time_is_kept_among_longer_runs() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let mut table = Table::open(&folder.path().join("runs.sqlite"))?;
+    let recording = recording(0.0)?;
+    let best = |table: &Table| table.place(&course("boxes"), f64::INFINITY).map(|place| place.and_then(|p| p.fastest));
+    // a run that ends before the finish has no time to compare
+    table.add(&run("boxes", 1, 100.0), &recording)?;
+    assert_eq!(best(&table)?, None);
+    let through = |seed, distance, seconds| Run { ended: "through".into(), seconds, ..run("boxes", seed, distance) };
+    for (seed, seconds) in [(2, 40.0), (3, 31.5), (4, 33.0)] {
+        table.add(&through(seed, 104.0, seconds), &recording)?;
+    }
+    assert_eq!(best(&table)?, Some(31.5));
+    // many runs that went farther do not push it out
+    for seed in 10..10 + ROWS as u64 + 5 {
+        table.add(&through(seed, 105.0, 50.0), &recording)?;
+    }
+    assert_eq!(best(&table)?, Some(31.5));
+    Ok(())
+}
+
+#[test]
 fn what_is_one_too_many_goes() -> Result<(), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("runs.sqlite");

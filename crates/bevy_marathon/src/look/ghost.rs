@@ -28,7 +28,8 @@ pub struct GhostPlugin;
 impl Plugin for GhostPlugin {
     fn build(&self, app: &mut App) {
         let shown = RunFixedMainLoopSystems::AfterFixedMainLoop;
-        app.register_type::<Ghost>().register_type::<ErrorColors>();
+        app.register_type::<Ghost>().register_type::<ErrorColors>().register_type::<ErrorPalette>();
+        app.init_resource::<ErrorPalette>();
         app.add_systems(RunFixedMainLoop, (haunt, color).in_set(shown).after(MarathonSystems::Show));
     }
 }
@@ -43,6 +44,38 @@ pub struct Ghost(pub Vec3);
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Component, Default, Clone, Debug, PartialEq)]
 pub struct ErrorColors;
+
+/// The colors of [`ErrorColors`], from a part that is where the clip has it to one that is far away.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Resource, Default, Clone, Debug, PartialEq)]
+pub enum ErrorPalette {
+    /// From green over yellow to red.
+    #[default]
+    GreenToRed,
+    /// From blue over gray to orange, which people with color blindness tell apart.
+    BlueToOrange,
+}
+
+impl ErrorPalette {
+    /// The color of a distance, 0 to 1.
+    fn color(self, far: f32) -> Color {
+        match self {
+            ErrorPalette::GreenToRed => {
+                Color::srgb((2.0 * far).min(1.0) * 0.86, (2.0 - 2.0 * far).min(1.0) * 0.68, 0.10)
+            }
+            ErrorPalette::BlueToOrange => {
+                let [near, far_out, middle] =
+                    [Vec3::new(0.0, 0.32, 0.75), Vec3::new(0.90, 0.45, 0.0), Vec3::splat(0.72)];
+                let [r, g, b] = match far < 0.5 {
+                    true => near.lerp(middle, 2.0 * far),
+                    false => middle.lerp(far_out, 2.0 * far - 1.0),
+                }
+                .to_array();
+                Color::srgb(r, g, b)
+            }
+        }
+    }
+}
 
 /// The body of a ghost.
 #[derive(Component)]
@@ -129,15 +162,15 @@ fn haunt(
 /// Colors parts by their errors, or as they were.
 fn color(
     marathon: Res<Marathon>,
-    time: Res<Time<Fixed>>,
+    (time, palette): (Res<Time<Fixed>>, Res<ErrorPalette>),
     mut materials: Option<ResMut<Assets<StandardMaterial>>>,
     mut ramp: Local<Vec<Handle<StandardMaterial>>>,
     ragdolls: Query<(Entity, &RagdollState, &Anatomy), With<ErrorColors>>,
     mut shapes: Query<(&Shape, &mut MeshMaterial3d<StandardMaterial>)>,
 ) {
     let Some(materials) = &mut materials else { return };
-    if ramp.is_empty() {
-        ramp.extend((0..SHADES).map(|i| materials.add(shade(i as f32 / (SHADES - 1) as f32))));
+    if ramp.is_empty() || palette.is_changed() {
+        *ramp = (0..SHADES).map(|i| materials.add(shade(*palette, i as f32 / (SHADES - 1) as f32))).collect();
     }
     let mut errors: HashMap<Entity, Vec<f32>> = HashMap::new();
     for (ragdoll, state, anatomy) in &ragdolls {
@@ -155,8 +188,7 @@ fn color(
     }
 }
 
-/// From green over yellow to red.
-fn shade(far: f32) -> StandardMaterial {
-    let color = Color::srgb((2.0 * far).min(1.0) * 0.86, (2.0 - 2.0 * far).min(1.0) * 0.68, 0.10);
-    StandardMaterial { base_color: color, perceptual_roughness: 0.5, reflectance: 0.4, ..default() }
+/// The material of a distance, 0 to 1.
+fn shade(palette: ErrorPalette, far: f32) -> StandardMaterial {
+    StandardMaterial { base_color: palette.color(far), perceptual_roughness: 0.5, reflectance: 0.4, ..default() }
 }

@@ -23,7 +23,7 @@ pub use camera::{CameraMode, FollowCamera, FollowCameraPlugin};
 pub use dust::DustPlugin;
 pub use foot_lock::FootLock;
 pub use generated::{GeneratedSkin, GeneratedSkinPlugin, SkinGeneration};
-pub use ghost::{ErrorColors, Ghost, GhostPlugin, part_errors};
+pub use ghost::{ErrorColors, ErrorPalette, Ghost, GhostPlugin, part_errors};
 pub use marks::{Marks, MarksPlugin, commanded_velocity};
 pub use quality::Quality;
 pub use scenery::SceneryPlugin;

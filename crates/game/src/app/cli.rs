@@ -8,9 +8,10 @@ use crate::app::input::steering::SteeringFrame;
 use crate::app::mode::Mode;
 use crate::app::pacing::FixedSettings;
 use crate::app::stage::clips::{FOLLOWER, follows_clip};
-use crate::app::stage::course::{self, CourseOptions, PlayerRole};
+use crate::app::stage::course::{self, BUILT_AGAINST, CourseOptions, LED, PlayerRole};
 use crate::app::stage::policies::ShippedPolicies;
 use crate::app::stage::scenario::{PolicySource, Scenario};
+use crate::app::stage::selection::HERO;
 use bevy_marathon::look::{CameraMode, Quality};
 use bevy_marathon::{Ground, spec_of_role};
 use clap::Parser;
@@ -24,7 +25,8 @@ use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
-  marathon-game                                  a trained hopper; everything else is in the menu (Esc)
+  marathon-game                                  the main menu
+  marathon-game hopper                           a trained hopper; everything else is in the menu (Esc)
   marathon-game humanoid --agents 16             a row of them
   marathon-game runs/hopper-1                    the policy of a run, which is read again whenever training saves it
   marathon-game hopper --mode learn              from random weights to a run, before your eyes
@@ -49,13 +51,9 @@ Keys are shown on the screen (F1) and can be changed in the menu.";
 #[command(name = "marathon-game", version, about, after_help = EXAMPLES)]
 pub struct Args {
     /// Agent (such as hopper, walker, humanoid, MarathonManRun), policy file, folder of a run, or MJCF file (.xml) [with
-    /// --mode imitate: MarathonManWalk; with --mode course: TerrainWalker2d, or with --role run AntController].
-    #[arg(default_value = "hopper", default_value_ifs([
-        ("mode", "imitate", "MarathonManWalk"),
-        ("role", "run", "AntController"),
-        ("mode", "course", "TerrainWalker2d"),
-    ]))]
-    pub what: String,
+    /// --mode imitate: MarathonManWalk; with --mode course: TerrainWalker2d, or with --role run AntController; with --record or
+    /// other options of a scene: hopper; otherwise the main menu].
+    pub what: Option<String>,
     /// Mode of the game.
     #[arg(long, value_enum, default_value_t = Mode::Watch)]
     pub mode: Mode,
@@ -170,6 +168,9 @@ pub struct Args {
     /// Video without text and bars.
     #[arg(long)]
     pub no_hud: bool,
+    /// Video with the prompts of the controls.
+    #[arg(long)]
+    pub prompts: bool,
 }
 
 /// Default size of a window or video, pixels.
@@ -201,6 +202,27 @@ impl Args {
         let Args { dead_zone, curve, smoothing, key_smoothing, .. } = *self;
         let keys = Mapping { smoothing: key_smoothing, ..Mappings::default().keys };
         Mappings { pad: Mapping { dead_zone, curve, smoothing }, keys }
+    }
+
+    /// The agent, file or folder, or the default of the mode.
+    fn what(&self) -> &str {
+        let default = match (self.mode, self.role) {
+            (Mode::Imitate, _) => "MarathonManWalk",
+            (_, Some(PlayerRole::Run)) => LED,
+            (Mode::Course, _) => BUILT_AGAINST,
+            _ if self.opens_menu() => HERO,
+            _ => "hopper",
+        };
+        self.what.as_deref().unwrap_or(default)
+    }
+
+    /// Whether the command line leaves the scene to the main menu. Options of the window and of the controls do not set a scene.
+    pub fn opens_menu(&self) -> bool {
+        let Args { what, mode, policy, agents, ground, replay, record, role, course, .. } = self;
+        let named = what.is_some() || policy.is_some() || replay.is_some() || record.is_some();
+        let set = *mode != Mode::Watch || *agents > 1 || *ground != Ground::Level || !self.task.given.is_empty();
+        let remote = self.mlagents_port.is_some() || self.watch_stream;
+        !(named || set || remote || role.is_some() || course.is_some() || self.difficulty.is_some())
     }
 
     /// Size of the window or video, pixels.
@@ -250,9 +272,10 @@ pub fn scenario(args: &Args, shipped: &ShippedPolicies) -> Result<Scenario, Game
         seed: args.seed(),
         model: None,
     };
-    let path = Path::new(&args.what);
+    let what = args.what();
+    let path = Path::new(what);
     let is_model = path.extension().is_some_and(|e| e == "xml" || e == "mjcf");
-    let given = match (&args.policy, registry::agent(&args.what)) {
+    let given = match (&args.policy, registry::agent(what)) {
         (_, Ok(agent)) => {
             scenario.agent = agent.facts().id;
             args.policy.clone()
@@ -268,7 +291,7 @@ pub fn scenario(args: &Args, shipped: &ShippedPolicies) -> Result<Scenario, Game
             }
             return Ok(scenario);
         }
-        (None, Err(_)) if path.exists() || args.what.contains(['/', '.']) => {
+        (None, Err(_)) if path.exists() || what.contains(['/', '.']) => {
             exists(path)?;
             check_is_policy(path)?;
             Some(path.to_path_buf())

@@ -8,12 +8,15 @@ use crate::app::features::course::leaderboard;
 use crate::app::features::remote::{mailbox, mlagents, pipe};
 use crate::app::game::GamePlugin;
 use crate::app::pacing::FramePace;
+use crate::app::settings::apply;
+use crate::app::settings::file::{self as settings_file, FileNotes, Loaded, SettingsFile};
+use crate::app::settings::values::Display;
 use crate::app::ui::question;
 use crate::app::video::{self, Video};
 use crate::app::{display, interrupt};
 use bevy::app::{PluginGroupBuilder, TerminalCtrlCHandlerPlugin};
 use bevy::prelude::*;
-use bevy::window::{PresentMode, WindowResolution};
+use bevy::window::{WindowMode, WindowResolution};
 use bevy_marathon::look::Quality;
 use clap::Parser;
 use marathon_physics::lanes::Isa;
@@ -70,8 +73,15 @@ pub fn run(args: &Args) -> Result<(), GameError> {
         return video::record(&video, game);
     }
     display::check_display()?;
-    if display::check_graphics()? && args.quality.is_none() {
-        game.set_quality(Quality::Low);
+    let software = display::check_graphics()?;
+    if software {
+        game.set_automatic_quality(Quality::Low);
+    }
+    let file = settings_file::default_path();
+    let Loaded { settings, mut notes } = file.as_deref().map(settings_file::load).unwrap_or_default();
+    let window = settings.clone();
+    if let Err(error) = game.set_settings(settings) {
+        notes.push(error.to_string());
     }
     let remote = match args.mlagents_port {
         Some(port) => {
@@ -83,9 +93,13 @@ pub fn run(args: &Args) -> Result<(), GameError> {
     };
     interrupt::listen();
     let mut app = App::new();
-    app.add_plugins(windowed(args.size())).add_plugins(game);
+    app.add_plugins(windowed(args.size(), &window.display, args.size.is_some())).add_plugins(game);
     #[cfg(feature = "sound")]
     app.add_plugins(audio::output);
+    app.insert_resource(FileNotes(notes));
+    if let Some(path) = file {
+        app.insert_resource(SettingsFile(path));
+    }
     app.add_systems(Update, (question::close, interrupt::quit));
     if args.max_fps > 0 {
         app.insert_resource(FramePace(Duration::from_secs_f64(1.0 / f64::from(args.max_fps))));
@@ -105,11 +119,13 @@ pub fn run(args: &Args) -> Result<(), GameError> {
 }
 
 /// Bevy's plugins for an app in a window.
-fn windowed((width, height): (u32, u32)) -> PluginGroupBuilder {
+fn windowed((width, height): (u32, u32), display: &Display, sized: bool) -> PluginGroupBuilder {
     let window = Window {
         title: "Marathon".into(),
         resolution: WindowResolution::new(width, height),
-        present_mode: PresentMode::AutoVsync,
+        present_mode: apply::present_mode(display.vsync),
+        // a size on the command line is that of a window
+        mode: if sized { WindowMode::Windowed } else { apply::window_mode(display.window) },
         ..default()
     };
     // closing the window may ask first

@@ -47,6 +47,20 @@ impl Mode {
         }
     }
 
+    /// Its goal, in a line on the screen.
+    pub fn goal(self) -> &'static str {
+        match self {
+            Mode::Watch => "Move the character as you like, or watch it.",
+            Mode::Push => "Find out what makes the character fall.",
+            Mode::Imitate => "See how closely the character follows its motion clip.",
+            Mode::Course => "Get to the finish.",
+            Mode::Learn => "Watch a policy learn from random weights.",
+            Mode::Testbed => "Move each motor of a model by hand.",
+            Mode::Replay => "Look at a recording, back and forth.",
+            Mode::Outside => "Watch what another program simulates.",
+        }
+    }
+
     /// Whether the game itself simulates the characters.
     pub fn is_simulated(self) -> bool {
         !matches!(self, Mode::Replay | Mode::Outside)

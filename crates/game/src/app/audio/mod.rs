@@ -22,23 +22,7 @@ pub struct PlaySound {
     pub loudness: f32,
 }
 
-/// Volumes, from 0 to 1. The loudness of a sound is multiplied by both.
-#[derive(Resource, Clone, Copy, Debug, PartialEq, Reflect)]
-#[reflect(Resource, Default, Clone, Debug, PartialEq)]
-pub struct Volumes {
-    /// Of everything.
-    pub master: f32,
-    /// Of steps, landings, balls and the crowd.
-    pub effects: f32,
-}
-
-impl Default for Volumes {
-    fn default() -> Self {
-        Volumes { master: 0.6, effects: 1.0 }
-    }
-}
-
 pub(super) fn plugin(app: &mut App) {
-    app.register_type::<Volumes>().init_resource::<Volumes>().add_message::<PlaySound>();
+    app.add_message::<PlaySound>();
     steps::plugin(app);
 }

@@ -1,8 +1,9 @@
 //! Output of sounds to the sound card. Without one, the game is silent.
 
+use crate::app::audio::PlaySound;
 use crate::app::audio::synth::{RATE, Sound};
-use crate::app::audio::{PlaySound, Volumes};
 use crate::app::mode::AppSet;
+use crate::app::settings::values::Volumes;
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_audio::{

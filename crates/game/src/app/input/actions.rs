@@ -1,6 +1,5 @@
-//! Actions, and the keys that steer instead of having an action.
+//! Actions, and the controls that steer instead of having an action.
 
-use bevy::input::gamepad::GamepadButton;
 use bevy::prelude::*;
 use clap::ValueEnum;
 
@@ -79,50 +78,90 @@ pub struct ActionRequested(pub Action);
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ActionPressed(pub Action);
 
-/// Keys that steer while the character takes commands: ahead and back, to the left and right, and, if the stick is the
-/// character's, a step aside to the left and right.
-pub const STEERING_KEYS: [KeyCode; 6] =
-    [KeyCode::ArrowUp, KeyCode::ArrowDown, KeyCode::ArrowLeft, KeyCode::ArrowRight, KeyCode::KeyA, KeyCode::KeyD];
-/// Keys that steer besides the arrows if the stick is the camera's: ahead and back, to the left and right.
-pub const MOVE_KEYS: [KeyCode; 4] = [KeyCode::KeyW, KeyCode::KeyS, KeyCode::KeyA, KeyCode::KeyD];
-/// Keys that make a character run while they are held, if the stick is the camera's.
-pub const RUN_KEYS: [KeyCode; 2] = [KeyCode::ShiftLeft, KeyCode::ShiftRight];
-/// Keys for the first and the second button of a command, such as a jump, for characters that turn.
-pub const COMMAND_KEYS: [KeyCode; 2] = [KeyCode::Space, KeyCode::KeyV];
 /// Keys that fly a free camera: ahead and back, to the left and right, up and down.
 pub const FLY_KEYS: [KeyCode; 6] =
     [KeyCode::KeyW, KeyCode::KeyS, KeyCode::KeyA, KeyCode::KeyD, KeyCode::KeyE, KeyCode::KeyQ];
-/// Gamepad buttons for the same as [`COMMAND_KEYS`].
-pub const COMMAND_BUTTONS: [GamepadButton; 2] = [GamepadButton::South, GamepadButton::East];
+/// Keys that make it fast.
+pub const FAST_KEYS: [KeyCode; 2] = [KeyCode::ShiftLeft, KeyCode::ShiftRight];
 
-/// The devices that steer the character in focus.
+/// A control of the character that is held, for characters that take commands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, ValueEnum)]
+pub enum Steer {
+    /// Away from the camera.
+    MoveAhead,
+    /// Toward the camera.
+    MoveBack,
+    /// To the left of the picture; a step aside if the stick is the character's.
+    MoveLeft,
+    /// To the right of the picture; a step aside if the stick is the character's.
+    MoveRight,
+    /// Another key for away from the camera; ahead if the stick is the character's.
+    SteerAhead,
+    /// Another key for toward the camera; back if the stick is the character's.
+    SteerBack,
+    /// Another key for the left of the picture; a turn if the stick is the character's.
+    SteerLeft,
+    /// Another key for the right of the picture; a turn if the stick is the character's.
+    SteerRight,
+    /// Run, while it is held.
+    Run,
+    /// The first button of a command, such as a jump.
+    Jump,
+    /// The second button of a command, such as a backflip.
+    Flip,
+}
+
+/// The purpose of keys and buttons.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum KeysFor {
+    /// The characters and the picture.
+    #[default]
+    Game,
+    /// A menu over the picture: only the actions [`KeysFor::allows`] work.
+    Menu,
+    /// A question over the picture: keys answer it.
+    Question,
+}
+
+impl KeysFor {
+    /// Whether an action works.
+    pub fn allows(self, action: Action) -> bool {
+        self == KeysFor::Game || matches!(action, Action::Menu | Action::Quit | Action::Picture)
+    }
+}
+
+/// The controls that steer the character in focus.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Steering {
-    /// The left stick and the `STEERING_KEYS`.
+    /// The left stick and the keys that steer.
     pub on: bool,
-    /// The `COMMAND_KEYS` and `COMMAND_BUTTONS`.
+    /// [`Steer::Jump`] and [`Steer::Flip`].
     pub buttons: bool,
-    /// The `MOVE_KEYS`: a stick points to a direction of the picture.
+    /// A stick points to a direction of the picture.
     pub by_camera: bool,
     /// The `FLY_KEYS`: they fly the camera, and no key steers.
     pub flying: bool,
 }
 
 impl Steering {
-    /// Whether a key steers and has no other action.
-    pub fn takes_key(&self, key: KeyCode) -> bool {
-        self.on && STEERING_KEYS.contains(&key)
-            || self.buttons && COMMAND_KEYS.contains(&key)
-            || self.by_camera && MOVE_KEYS.contains(&key)
-            || self.flying && FLY_KEYS.contains(&key)
+    /// Whether a key flies the camera, and has no other action.
+    pub fn flies(&self, key: KeyCode) -> bool {
+        self.flying && FLY_KEYS.contains(&key)
     }
 
-    /// Whether a gamepad button steers and has no other action.
-    pub fn takes_button(&self, button: GamepadButton) -> bool {
-        self.buttons && COMMAND_BUTTONS.contains(&button)
+    /// Whether a control has an effect. Its key and its button have no other action then.
+    pub fn takes(&self, steer: Steer) -> bool {
+        match steer {
+            Steer::MoveAhead | Steer::MoveBack | Steer::Run => self.by_camera,
+            Steer::Jump | Steer::Flip => self.buttons,
+            _ => self.on,
+        }
     }
 }
 
 pub(super) fn plugin(app: &mut App) {
-    app.init_resource::<Steering>().add_message::<ActionRequested>().add_message::<ActionPressed>();
+    app.init_resource::<Steering>()
+        .init_resource::<KeysFor>()
+        .add_message::<ActionRequested>()
+        .add_message::<ActionPressed>();
 }

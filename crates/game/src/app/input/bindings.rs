@@ -1,53 +1,100 @@
-//! The keys and buttons of the actions: their defaults, how the user changes them, and the file that keeps them.
+//! The keys and buttons of actions and of the controls that steer, and their defaults.
 
-use crate::app::input::actions::{Action, ActionRequested, Steering};
-use crate::app::input::key_names::{KEYS, button_name, key_name};
-use bevy::input::InputSystems;
-use bevy::input::gamepad::{Gamepad, GamepadButton};
+use crate::app::input::actions::{Action, Steer, Steering};
+use crate::app::input::key_names::{BUTTON_NAMES, KEYS, button_name, key_name};
+use bevy::input::gamepad::GamepadButton;
 use bevy::prelude::*;
-use bevy_egui::input::EguiWantsInput;
-use marathon_physics::budget;
-use serde_json::{Map, Value};
-use std::path::PathBuf;
+use clap::ValueEnum;
+use marathon_physics::hint::among;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::collections::BTreeMap;
 
-/// An action, its name on the screen, its key and its button.
-type Row = (Action, &'static str, KeyCode, Option<GamepadButton>);
+/// Something with a key and perhaps a button.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Bindable {
+    /// Happens once per press.
+    Action(Action),
+    /// Lasts while it is held.
+    Steer(Steer),
+}
 
-const DEFAULTS: [Row; 31] = [
-    (Action::Menu, "menu", KeyCode::Escape, Some(GamepadButton::Start)),
-    (Action::Pause, "pause", KeyCode::Enter, Some(GamepadButton::Select)),
-    (Action::Step, "one step", KeyCode::Period, None),
-    (Action::Faster, "faster", KeyCode::ArrowUp, Some(GamepadButton::DPadUp)),
-    (Action::Slower, "slower", KeyCode::ArrowDown, Some(GamepadButton::DPadDown)),
-    (Action::Restart, "start anew", KeyCode::KeyX, Some(GamepadButton::West)),
-    (Action::NextFocus, "next character", KeyCode::Tab, Some(GamepadButton::RightTrigger)),
-    (Action::NextAgent, "next agent", KeyCode::KeyN, Some(GamepadButton::North)),
-    (Action::Camera, "camera", KeyCode::KeyC, Some(GamepadButton::LeftTrigger)),
-    (Action::Push, "push", KeyCode::KeyP, Some(GamepadButton::South)),
-    (Action::Throw, "throw a ball", KeyCode::KeyB, Some(GamepadButton::East)),
-    (Action::Limp, "limp", KeyCode::KeyZ, None),
-    (Action::Film, "film of the last 10 s", KeyCode::F9, None),
-    (Action::Contacts, "contacts", KeyCode::KeyF, None),
-    (Action::Joints, "joints", KeyCode::KeyJ, None),
-    (Action::Ghost, "ghost of the clip", KeyCode::KeyK, None),
-    (Action::Errors, "errors in color", KeyCode::KeyE, None),
-    (Action::Hud, "text and bars", KeyCode::KeyH, None),
-    (Action::Help, "keys", KeyCode::F1, None),
-    (Action::Learn, "learn live", KeyCode::KeyL, None),
-    (Action::Save, "save policy", KeyCode::KeyS, None),
-    (Action::Record, "record", KeyCode::KeyR, Some(GamepadButton::RightThumb)),
-    (Action::Back, "back", KeyCode::ArrowLeft, Some(GamepadButton::DPadLeft)),
-    (Action::Ahead, "ahead", KeyCode::ArrowRight, Some(GamepadButton::DPadRight)),
-    (Action::Release, "let go", KeyCode::KeyG, Some(GamepadButton::LeftThumb)),
-    (Action::Higher, "build higher", KeyCode::PageUp, None),
-    (Action::Lower, "build lower", KeyCode::PageDown, None),
-    (Action::Even, "build level", KeyCode::Home, None),
-    (Action::Runs, "longest runs", KeyCode::KeyT, None),
-    (Action::Picture, "picture", KeyCode::F12, None),
-    (Action::Quit, "quit", KeyCode::KeyQ, None),
+/// A key or a button of a gamepad.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Press {
+    /// A key.
+    Key(KeyCode),
+    /// A button of a gamepad.
+    Button(GamepadButton),
+}
+
+/// Something with its name on the screen, its key and its button.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// The action or control.
+    pub what: Bindable,
+    /// Its name on the screen.
+    pub name: &'static str,
+    /// Its key.
+    pub key: KeyCode,
+    /// Its button.
+    pub button: Option<GamepadButton>,
+}
+
+const fn act(action: Action, name: &'static str, key: KeyCode, button: Option<GamepadButton>) -> Row {
+    Row { what: Bindable::Action(action), name, key, button }
+}
+
+const fn steer(steer: Steer, name: &'static str, key: KeyCode, button: Option<GamepadButton>) -> Row {
+    Row { what: Bindable::Steer(steer), name, key, button }
+}
+
+const DEFAULTS: [Row; 42] = [
+    steer(Steer::MoveAhead, "move ahead", KeyCode::KeyW, None),
+    steer(Steer::MoveBack, "move back", KeyCode::KeyS, None),
+    steer(Steer::MoveLeft, "move left", KeyCode::KeyA, None),
+    steer(Steer::MoveRight, "move right", KeyCode::KeyD, None),
+    steer(Steer::SteerAhead, "steer ahead", KeyCode::ArrowUp, None),
+    steer(Steer::SteerBack, "steer back", KeyCode::ArrowDown, None),
+    steer(Steer::SteerLeft, "steer left", KeyCode::ArrowLeft, None),
+    steer(Steer::SteerRight, "steer right", KeyCode::ArrowRight, None),
+    steer(Steer::Run, "run", KeyCode::ShiftLeft, None),
+    steer(Steer::Jump, "jump", KeyCode::Space, Some(GamepadButton::South)),
+    steer(Steer::Flip, "flip", KeyCode::KeyV, Some(GamepadButton::East)),
+    act(Action::Menu, "menu", KeyCode::Escape, Some(GamepadButton::Start)),
+    act(Action::Pause, "pause", KeyCode::Enter, Some(GamepadButton::Select)),
+    act(Action::Step, "one step", KeyCode::Period, None),
+    act(Action::Faster, "faster", KeyCode::ArrowUp, Some(GamepadButton::DPadUp)),
+    act(Action::Slower, "slower", KeyCode::ArrowDown, Some(GamepadButton::DPadDown)),
+    act(Action::Restart, "restart", KeyCode::KeyX, Some(GamepadButton::West)),
+    act(Action::NextFocus, "next character", KeyCode::Tab, Some(GamepadButton::RightTrigger)),
+    act(Action::NextAgent, "next agent", KeyCode::KeyN, Some(GamepadButton::North)),
+    act(Action::Camera, "camera", KeyCode::KeyC, Some(GamepadButton::LeftTrigger)),
+    act(Action::Push, "push", KeyCode::KeyP, Some(GamepadButton::South)),
+    act(Action::Throw, "throw a ball", KeyCode::KeyB, Some(GamepadButton::RightTrigger2)),
+    act(Action::Limp, "limp", KeyCode::KeyZ, None),
+    act(Action::Film, "film of the last 10 s", KeyCode::F9, None),
+    act(Action::Contacts, "contacts", KeyCode::KeyF, None),
+    act(Action::Joints, "joints", KeyCode::KeyJ, None),
+    act(Action::Ghost, "ghost of the clip", KeyCode::KeyK, None),
+    act(Action::Errors, "errors in color", KeyCode::KeyE, None),
+    act(Action::Hud, "text and bars", KeyCode::KeyH, None),
+    act(Action::Help, "keys", KeyCode::F1, None),
+    act(Action::Learn, "learn live", KeyCode::KeyL, None),
+    act(Action::Save, "save policy", KeyCode::KeyS, None),
+    act(Action::Record, "record", KeyCode::KeyR, Some(GamepadButton::RightThumb)),
+    act(Action::Back, "back", KeyCode::ArrowLeft, Some(GamepadButton::DPadLeft)),
+    act(Action::Ahead, "ahead", KeyCode::ArrowRight, Some(GamepadButton::DPadRight)),
+    act(Action::Release, "let go", KeyCode::KeyG, Some(GamepadButton::LeftThumb)),
+    act(Action::Higher, "build higher", KeyCode::PageUp, None),
+    act(Action::Lower, "build lower", KeyCode::PageDown, None),
+    act(Action::Even, "build level", KeyCode::Home, None),
+    act(Action::Runs, "longest runs", KeyCode::KeyT, None),
+    act(Action::Picture, "picture", KeyCode::F12, None),
+    act(Action::Quit, "quit", KeyCode::KeyQ, None),
 ];
 
-/// The keys and buttons of all actions.
+/// The keys and buttons of all actions and of all controls that steer.
 #[derive(Resource, Clone, Debug, PartialEq)]
 pub struct Bindings {
     rows: Vec<Row>,
@@ -59,138 +106,165 @@ impl Default for Bindings {
     }
 }
 
-/// The action that the next pressed key is bound to.
-#[derive(Resource, Default)]
-pub struct Rebinding(pub Option<Action>);
-
 pub(super) fn plugin(app: &mut App) {
-    app.init_resource::<Bindings>()
-        .init_resource::<Rebinding>()
-        .add_systems(Startup, load)
-        .add_systems(PreUpdate, (read, rebind).chain().after(InputSystems));
+    app.init_resource::<Bindings>();
+}
+
+impl Bindable {
+    /// Its name in the settings file.
+    pub fn id(self) -> String {
+        let value = match self {
+            Bindable::Action(action) => action.to_possible_value(),
+            Bindable::Steer(steer) => steer.to_possible_value(),
+        };
+        value.map(|value| value.get_name().to_string()).unwrap_or_default()
+    }
+
+    /// Whether both need different keys. A key that steers may have an action as well, which it has when nothing is steered.
+    fn competes(self, other: Bindable) -> bool {
+        matches!(self, Bindable::Action(_)) == matches!(other, Bindable::Action(_))
+    }
+}
+
+impl Press {
+    /// Its name on the screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Press::Key(key) => key_name(key),
+            Press::Button(button) => button_name(button),
+        }
+    }
 }
 
 impl Bindings {
-    /// All actions in the order of the help: name, key, button.
-    pub fn rows(&self) -> impl Iterator<Item = (Action, &'static str, &'static str, Option<&'static str>)> {
-        self.rows.iter().map(|(action, name, key, button)| (*action, *name, key_name(*key), button.map(button_name)))
+    /// Everything that has a key, in the order of the help.
+    pub fn rows(&self) -> impl Iterator<Item = &Row> {
+        self.rows.iter()
     }
 
-    /// Like [`Bindings::rows`], but without the names of keys and buttons that steer.
+    /// All actions in the order of the help: name, and the names of key and button, without those that steer.
     pub fn free_rows(
         &self,
         steering: Steering,
     ) -> impl Iterator<Item = (Action, &'static str, Option<&'static str>, Option<&'static str>)> {
-        self.rows.iter().map(move |(action, name, key, button)| {
-            let key = Some(*key).filter(|key| !steering.takes_key(*key)).map(key_name);
-            let button = button.filter(|button| !steering.takes_button(*button)).map(button_name);
-            (*action, *name, key, button)
+        self.rows.iter().filter_map(move |row| {
+            let Bindable::Action(action) = row.what else { return None };
+            let free = |press: &Press| !self.steers(steering, *press);
+            let key = Some(Press::Key(row.key)).filter(free).map(Press::name);
+            let button = row.button.map(Press::Button).filter(free).map(Press::name);
+            Some((action, row.name, key, button))
         })
+    }
+
+    /// Whether a key or button steers now.
+    pub fn steers(&self, steering: Steering, press: Press) -> bool {
+        let trigger = [GamepadButton::LeftTrigger2, GamepadButton::RightTrigger2].map(Press::Button).contains(&press);
+        trigger && steering.on && !steering.by_camera
+            || self.rows.iter().any(|row| match row.what {
+                Bindable::Steer(steer) => steering.takes(steer) && row.has(press),
+                Bindable::Action(_) => false,
+            })
+    }
+
+    /// The row of an action or control.
+    pub fn row(&self, what: Bindable) -> &Row {
+        // every variant has a row, which a test checks
+        self.rows.iter().find(|row| row.what == what).unwrap_or(&self.rows[0])
     }
 
     /// Name of the key of an action.
     pub fn key(&self, action: Action) -> &'static str {
-        self.rows.iter().find(|row| row.0 == action).map_or("", |row| key_name(row.2))
+        key_name(self.row(Bindable::Action(action)).key)
     }
 
-    /// Binds a key. An action that had it gets the former key, so that every action has one.
-    pub fn bind(&mut self, action: Action, key: KeyCode) {
-        let Some(old) = self.rows.iter().find(|row| row.0 == action).map(|row| row.2) else { return };
+    /// The key of a control that steers.
+    pub fn steering_key(&self, steer: Steer) -> KeyCode {
+        self.row(Bindable::Steer(steer)).key
+    }
+
+    /// The button of a control that steers.
+    pub fn steering_button(&self, steer: Steer) -> Option<GamepadButton> {
+        self.row(Bindable::Steer(steer)).button
+    }
+
+    /// The one that has a key or button, which `what` would take away.
+    pub fn taken(&self, what: Bindable, press: Press) -> Option<Bindable> {
+        let competing = self.rows.iter().filter(|row| row.what != what && row.what.competes(what));
+        competing.filter(|row| row.has(press)).map(|row| row.what).next()
+    }
+
+    /// Binds a key or button. The one that had it gets the former one, so that nothing loses its key.
+    pub fn bind(&mut self, what: Bindable, press: Press) {
+        let old = *self.row(what);
+        let taken = self.taken(what, press);
         for row in &mut self.rows {
-            if row.0 == action {
-                row.2 = key;
-            } else if row.2 == key {
-                row.2 = old;
+            let swapped = taken == Some(row.what);
+            match press {
+                Press::Key(key) if row.what == what => row.key = key,
+                Press::Key(_) if swapped => row.key = old.key,
+                Press::Button(button) if row.what == what => row.button = Some(button),
+                Press::Button(_) if swapped => row.button = old.button,
+                _ => {}
             }
         }
     }
+}
 
-    /// Path of the file, in the user's folder for configurations, if there is one.
-    pub fn path() -> Option<PathBuf> {
-        let own = std::env::var_os("XDG_CONFIG_HOME").map(PathBuf::from);
-        let home = std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".config"));
-        let roaming = std::env::var_os("APPDATA").map(PathBuf::from);
-        own.or(home).or(roaming).map(|folder| folder.join("marathon/keys.json"))
+impl Row {
+    fn has(&self, press: Press) -> bool {
+        match press {
+            Press::Key(key) => self.key == key,
+            Press::Button(button) => self.button == Some(button),
+        }
     }
+}
 
-    /// Reads the text of the file. Actions that it does not name have their default keys.
-    pub fn load(text: &str) -> Self {
+/// Name of no button in the settings file.
+const NONE: &str = "none";
+
+/// The bindings in the settings file: names of keys and buttons.
+#[derive(Default, Serialize, Deserialize)]
+#[serde(default)]
+struct Written {
+    keys: BTreeMap<String, String>,
+    pad: BTreeMap<String, String>,
+}
+
+impl Serialize for Bindings {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let keys = self.rows.iter().map(|row| (row.what.id(), key_name(row.key).into()));
+        let pad = self.rows.iter().map(|row| (row.what.id(), row.button.map_or(NONE, button_name).into()));
+        Written { keys: keys.collect(), pad: pad.collect() }.serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Bindings {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let written = Written::deserialize(deserializer)?;
         let mut bindings = Bindings::default();
-        let Ok(Value::Object(map)) = serde_json::from_str(text) else { return bindings };
-        for (name, key) in &map {
-            let action = DEFAULTS.iter().find(|row| row.1 == name).map(|row| row.0);
-            let key = KEYS.iter().find(|(_, label)| Some(*label) == key.as_str()).map(|(key, _)| *key);
-            if let (Some(action), Some(key)) = (action, key) {
-                bindings.bind(action, key);
+        for Row { what, .. } in DEFAULTS {
+            if let Some(name) = written.keys.get(&what.id()) {
+                let known = KEYS.iter().find(|(_, known)| known == name);
+                let names = KEYS.map(|(_, name)| name);
+                let (key, _) =
+                    known.ok_or_else(|| D::Error::custom(format!("no key '{name}'{}", among(name, &names))))?;
+                bindings.bind(what, Press::Key(*key));
+            }
+            match written.pad.get(&what.id()) {
+                Some(name) if name == NONE => bindings.rows.iter_mut().for_each(|row| {
+                    row.button = row.button.filter(|_| row.what != what);
+                }),
+                Some(name) => {
+                    let known = BUTTON_NAMES.iter().find(|(_, known)| known == name);
+                    let names = BUTTON_NAMES.map(|(_, name)| name);
+                    let button =
+                        known.ok_or_else(|| D::Error::custom(format!("no button '{name}'{}", among(name, &names))))?;
+                    bindings.bind(what, Press::Button(button.0));
+                }
+                None => {}
             }
         }
-        bindings
-    }
-
-    /// The text of the file.
-    pub fn text(&self) -> String {
-        let map: Map<String, Value> = self.rows().map(|(_, name, key, _)| (name.into(), key.into())).collect();
-        format!("{:#}\n", Value::Object(map))
-    }
-}
-
-/// Turns keys and buttons into actions.
-pub fn read(
-    keys: Res<ButtonInput<KeyCode>>,
-    pads: Query<&Gamepad>,
-    bindings: Res<Bindings>,
-    rebinding: Res<Rebinding>,
-    wants: Option<Res<EguiWantsInput>>,
-    steering: Option<Res<Steering>>,
-    mut pressed: MessageWriter<ActionRequested>,
-) {
-    // a text field has the keyboard, or the next key is to be bound
-    let typing = wants.is_some_and(|w| w.wants_keyboard_input()) || rebinding.0.is_some();
-    let steering = steering.map_or_else(Steering::default, |steering| *steering);
-    for (action, _, key, button) in &bindings.rows {
-        let taken = typing || steering.takes_key(*key);
-        let key = !taken && keys.just_pressed(*key);
-        let own = button.filter(|button| !steering.takes_button(*button));
-        let button = own.is_some_and(|button| pads.iter().any(|pad| pad.just_pressed(button)));
-        if key || button {
-            pressed.write(ActionRequested(*action));
-        }
-    }
-}
-
-/// Binds the next pressed key if a binding was requested, and saves the bindings. Esc cancels.
-pub fn rebind(keys: Res<ButtonInput<KeyCode>>, mut bindings: ResMut<Bindings>, mut rebinding: ResMut<Rebinding>) {
-    let Some(action) = rebinding.0 else { return };
-    if keys.just_pressed(KeyCode::Escape) {
-        rebinding.0 = None;
-        return;
-    }
-    let Some(key) = keys.get_just_pressed().find(|key| KEYS.iter().any(|(known, _)| known == *key)) else { return };
-    bindings.bind(action, *key);
-    rebinding.0 = None;
-    keep(&bindings);
-}
-
-/// Saves the bindings for later games.
-pub fn keep(bindings: &Bindings) {
-    if let Some(path) = Bindings::path() {
-        let kept = path.parent().map_or(Ok(()), std::fs::create_dir_all).map_err(|e| e.to_string());
-        let kept = kept.and_then(|()| {
-            let text = bindings.text();
-            marathon_learn::write_atomic(&path, text.as_bytes()).map_err(|e| e.to_string())
-        });
-        if let Err(error) = kept {
-            warn!("the keys cannot be saved for later games: {error}");
-        }
-    }
-}
-
-/// Reads the bindings of earlier games.
-fn load(mut bindings: ResMut<Bindings>) {
-    let Some(path) = Bindings::path().filter(|path| path.exists()) else { return };
-    match budget::read_to_string(&path, &budget::CONFIG_FILE) {
-        Ok(text) => *bindings = Bindings::load(&text),
-        Err(error) => warn!("{}: {error}; all keys have their defaults", path.display()),
+        Ok(bindings)
     }
 }
 
@@ -201,21 +275,35 @@ mod tests {
     #[test]
     fn every_key_does_one_thing_and_has_a_name() {
         let bindings = Bindings::default();
-        let mut keys: Vec<_> = bindings.rows().map(|(_, _, key, _)| key).collect();
-        assert!(!keys.contains(&"?") && bindings.rows().all(|(.., button)| button != Some("?")));
-        keys.sort_unstable();
-        keys.dedup();
-        assert_eq!(keys.len(), DEFAULTS.len());
+        for row in bindings.rows() {
+            for press in [Some(Press::Key(row.key)), row.button.map(Press::Button)].into_iter().flatten() {
+                assert_eq!(bindings.taken(row.what, press), None, "{}", row.name);
+                assert_ne!(press.name(), "?", "{}", row.name);
+            }
+        }
+        let actions = Action::value_variants().iter().map(|action| Bindable::Action(*action));
+        for what in actions.chain(Steer::value_variants().iter().map(|steer| Bindable::Steer(*steer))) {
+            assert_eq!(bindings.row(what).what, what);
+        }
     }
 
     #[test]
-    fn a_key_that_is_taken_changes_places() {
+    fn a_key_that_is_taken_changes_places() -> Result<(), serde_json::Error> {
         let mut bindings = Bindings::default();
-        bindings.bind(Action::Push, KeyCode::KeyB);
+        let [push, jump] = [Bindable::Action(Action::Push), Bindable::Steer(Steer::Jump)];
+        assert_eq!(bindings.taken(push, Press::Key(KeyCode::KeyB)), Some(Bindable::Action(Action::Throw)));
+        bindings.bind(push, Press::Key(KeyCode::KeyB));
         assert_eq!((bindings.key(Action::Push), bindings.key(Action::Throw)), ("B", "P"));
-        assert_eq!(Bindings::load(&bindings.text()), bindings);
-        for broken in ["", "[1]", "{\"push\": 7}", "{\"push\": \"no such key\"}"] {
-            assert_eq!(Bindings::load(broken), Bindings::default());
-        }
+        // a key that steers may have an action
+        assert_eq!(bindings.taken(jump, Press::Key(KeyCode::KeyP)), None);
+        bindings.bind(jump, Press::Key(KeyCode::KeyP));
+        assert_eq!(bindings.key(Action::Throw), "P");
+        bindings.bind(jump, Press::Button(GamepadButton::East));
+        assert_eq!(bindings.steering_button(Steer::Flip), Some(GamepadButton::South));
+        let text = serde_json::to_string(&bindings)?;
+        assert_eq!(serde_json::from_str::<Bindings>(&text)?, bindings);
+        let error = serde_json::from_str::<Bindings>(r#"{"keys": {"push": "Spaec"}}"#).expect_err("no such key");
+        assert!(error.to_string().contains("did you mean 'Space'"), "{error}");
+        Ok(())
     }
 }

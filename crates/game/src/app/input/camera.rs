@@ -1,7 +1,7 @@
 //! Mouse, sticks and keys move the camera. A key saves a picture.
 
 use crate::app::files::free_name;
-use crate::app::input::actions::{Action, ActionPressed, FLY_KEYS, RUN_KEYS, Steering};
+use crate::app::input::actions::{Action, ActionPressed, FAST_KEYS, FLY_KEYS, Steering};
 use crate::app::mode::AppSet;
 use crate::app::mode::Mode;
 use crate::app::notifications::Notifications;
@@ -162,7 +162,7 @@ fn fly(
     }
     let [ahead, back, left, right, up, down] = FLY_KEYS.map(|key| f32::from(u8::from(keys.pressed(key))));
     let way = Vec3::new(right - left, up - down, back - ahead).normalize_or_zero();
-    let speed = FLIGHT[usize::from(keys.any_pressed(RUN_KEYS))];
+    let speed = FLIGHT[usize::from(keys.any_pressed(FAST_KEYS))];
     for mut camera in cameras.iter_mut().filter(|camera| camera.mode == CameraMode::Free && way != Vec3::ZERO) {
         camera.fly(speed * time.delta_secs() * way);
     }

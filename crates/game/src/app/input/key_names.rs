@@ -4,7 +4,7 @@ use bevy::input::gamepad::GamepadButton;
 use bevy::prelude::*;
 
 /// The keys that an action can be bound to, with their names on the screen.
-pub const KEYS: [(KeyCode, &str); 64] = [
+pub const KEYS: [(KeyCode, &str); 74] = [
     (KeyCode::Escape, "Esc"),
     (KeyCode::Space, "Space"),
     (KeyCode::Enter, "Enter"),
@@ -21,6 +21,16 @@ pub const KEYS: [(KeyCode, &str); 64] = [
     (KeyCode::ArrowRight, "Right"),
     (KeyCode::Period, "."),
     (KeyCode::Comma, ","),
+    (KeyCode::Slash, "Slash"),
+    (KeyCode::Semicolon, "Semicolon"),
+    (KeyCode::Quote, "Quote"),
+    (KeyCode::Minus, "Minus"),
+    (KeyCode::Equal, "Equal"),
+    (KeyCode::ShiftLeft, "Shift"),
+    (KeyCode::ShiftRight, "Right Shift"),
+    (KeyCode::ControlLeft, "Ctrl"),
+    (KeyCode::ControlRight, "Right Ctrl"),
+    (KeyCode::AltLeft, "Alt"),
     (KeyCode::KeyA, "A"),
     (KeyCode::KeyB, "B"),
     (KeyCode::KeyC, "C"),
@@ -72,7 +82,7 @@ pub const KEYS: [(KeyCode, &str); 64] = [
 ];
 
 /// The buttons of a gamepad, with their names on the screen.
-const BUTTON_NAMES: [(GamepadButton, &str); 14] = [
+pub const BUTTON_NAMES: [(GamepadButton, &str); 16] = [
     (GamepadButton::South, "A"),
     (GamepadButton::East, "B"),
     (GamepadButton::West, "X"),
@@ -81,6 +91,8 @@ const BUTTON_NAMES: [(GamepadButton, &str); 14] = [
     (GamepadButton::Select, "Back"),
     (GamepadButton::LeftTrigger, "LB"),
     (GamepadButton::RightTrigger, "RB"),
+    (GamepadButton::LeftTrigger2, "LT"),
+    (GamepadButton::RightTrigger2, "RT"),
     (GamepadButton::LeftThumb, "L3"),
     (GamepadButton::RightThumb, "R3"),
     (GamepadButton::DPadUp, "D-pad up"),

@@ -1,11 +1,9 @@
 //! Sticks, triggers and keys command the character in focus, if its agent takes commands. The deflections of a device pass its
 //! [mapping](Mapping). A [frame](SteeringFrame) says which way a stick points.
 
-use crate::app::input::actions::{
-    Action, ActionPressed, COMMAND_BUTTONS, COMMAND_KEYS, MOVE_KEYS, RUN_KEYS, STEERING_KEYS, Steering,
-};
-use crate::app::input::bindings;
-use crate::app::input::key_names::{button_name, key_name};
+use crate::app::input::actions::{Action, ActionPressed, KeysFor, Steer, Steering};
+use crate::app::input::bindings::Bindings;
+use crate::app::input::read::ReadSet;
 use crate::app::input::response::{Mapping, Mappings};
 use crate::app::mode::Mode;
 use crate::app::stage::actors::{Actor, Focus};
@@ -32,7 +30,7 @@ pub enum SteeringFrame {
     Character,
 }
 
-/// Pace of the keys without [`RUN_KEYS`].
+/// Pace of the keys without [`Steer::Run`].
 const WALK: f32 = 0.5;
 
 /// Deflection ahead, to the left, and aside to the left, in [-1, 1], and two buttons, 0 or 1.
@@ -51,7 +49,14 @@ pub struct Deflections {
 
 impl Deflections {
     /// Takes in the present state of the devices.
-    fn update(&mut self, pads: &Query<(Entity, &Gamepad)>, keys: Deflection, mappings: &Mappings, dt: f32) {
+    fn update(
+        &mut self,
+        pads: &Query<(Entity, &Gamepad)>,
+        of_pad: impl Fn(&Gamepad) -> Deflection,
+        keys: Deflection,
+        mappings: &Mappings,
+        dt: f32,
+    ) {
         let update = |last: &mut Deflection, now: Deflection, mapping: &Mapping| {
             *last = [0, 1, 2, 3, 4].map(|i| if i < STICKS { mapping.smooth(last[i], now[i], dt) } else { now[i] });
         };
@@ -61,7 +66,7 @@ impl Deflections {
                 self.pads.push((entity, REST));
                 self.pads.len() - 1
             });
-            update(&mut self.pads[at].1, of_pad(pad, &mappings.pad), &mappings.pad);
+            update(&mut self.pads[at].1, of_pad(pad), &mappings.pad);
         }
         update(&mut self.keys, keys, &mappings.keys);
     }
@@ -79,57 +84,10 @@ impl Deflections {
     }
 }
 
-/// Describes a control that steers.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Control {
-    /// The keys.
-    pub keys: &'static str,
-    /// The gamepad's controls.
-    pub pad: &'static str,
-    /// The name of the command value that the control sets.
-    pub does: String,
-}
-
-/// The controls for a command with these ranges, in the order in which [`command_of`] reads them.
-pub fn controls(ranges: &[CommandRange], by_camera: bool) -> Vec<Control> {
-    if by_camera {
-        let move_it = Control { keys: "W A S D", pad: "left stick", does: "move".into() };
-        let run = Control { keys: "Shift", pad: "left stick", does: "run".into() };
-        return [move_it, run].into_iter().chain(command_controls(ranges)).collect();
-    }
-    let control = |keys, pad, i: usize| Control { keys, pad, does: ranges[i].name.replace('_', " ") };
-    let number_of = |is: fn(&CommandRange) -> bool| ranges.iter().position(is);
-    let kinds = [CommandRange::is_speed, CommandRange::is_turn, CommandRange::is_button].map(number_of);
-    match kinds {
-        [Some(speed), None, Some(button)] => {
-            vec![control("Left Right", "left stick", speed), control("Up", "left stick up", button)]
-        }
-        [Some(speed), None, None] => vec![control("arrows", "left stick", speed)],
-        [Some(speed), Some(turn), _] => {
-            let mut all = vec![control("Up Down", "left stick", speed), control("Left Right", "left stick", turn)];
-            if let Some(second) = ranges.iter().skip(speed + 1).position(CommandRange::is_speed) {
-                all.push(Control { does: "step aside".into(), ..control("A D", "triggers", speed + 1 + second) });
-            }
-            all.extend(command_controls(ranges));
-            all
-        }
-        _ => {
-            let keys = [("Up Down", "left stick"), ("Left Right", "left stick")];
-            keys.into_iter().take(ranges.len()).enumerate().map(|(i, (keys, pad))| control(keys, pad, i)).collect()
-        }
-    }
-}
-
-/// The controls of the buttons of a command.
-fn command_controls(ranges: &[CommandRange]) -> impl Iterator<Item = Control> {
-    let names = COMMAND_KEYS.map(key_name).into_iter().zip(COMMAND_BUTTONS.map(button_name));
-    buttons(ranges).zip(names).map(|(i, (keys, pad))| Control { keys, pad, does: ranges[i].name.replace('_', " ") })
-}
-
 pub(super) fn plugin(app: &mut App) {
     app.init_resource::<Mappings>()
         .init_resource::<SteeringFrame>()
-        .add_systems(PreUpdate, steer.after(InputSystems).before(bindings::read));
+        .add_systems(PreUpdate, steer.after(InputSystems).before(ReadSet));
 }
 
 /// Sends the command of the first gamepad and the keys to the character in focus, and those of other gamepads to the
@@ -142,6 +100,7 @@ fn steer(
     keys: Res<ButtonInput<KeyCode>>,
     pads: Query<(Entity, &Gamepad)>,
     wants: Option<Res<EguiWantsInput>>,
+    (bindings, keys_for): (Res<Bindings>, Res<KeysFor>),
     mut actions: MessageReader<ActionPressed>,
     (scenario, loaded, focus): (Res<Scenario>, Res<LoadedPolicy>, Res<Focus>),
     mut steering: ResMut<Steering>,
@@ -158,10 +117,12 @@ fn steer(
     // on a course the runner stays under player control until the run ends
     let released = actions.read().filter(|action| action.0 == Action::Release).count() > 0 && !on_course;
     let spectator = on_course && scenario.course.role != PlayerRole::Run;
-    let typing = wants.is_some_and(|w| w.wants_keyboard_input());
-    let flying = cameras.iter().any(|(_, camera)| camera.mode == CameraMode::Free);
-    let held = of_keys((!typing && !flying).then_some(&*keys), steering.by_camera);
-    deflections.update(&pads, held, &mappings, time.delta_secs());
+    let in_menu = *keys_for != KeysFor::Game;
+    let typing = in_menu || wants.is_some_and(|w| w.wants_keyboard_input());
+    let flying = !in_menu && cameras.iter().any(|(_, camera)| camera.mode == CameraMode::Free);
+    let held = of_keys((!typing && !flying).then_some(&*keys), &bindings, steering.by_camera);
+    let of_pad = |pad: &Gamepad| if in_menu { REST } else { of_pad(pad, &bindings, &mappings.pad) };
+    deflections.update(&pads, of_pad, held, &mappings, time.delta_secs());
     let (mut own, count) = (Steering { flying, ..default() }, actors.iter().count());
     for (entity, actor, anatomy, command, mut restart, movement) in &mut actors {
         let ranges = anatomy.spec.as_ref().map_or(&[][..], |spec| &spec.command);
@@ -218,26 +179,33 @@ fn farthest(a: f32, b: f32) -> f32 {
 }
 
 /// The deflection of a gamepad.
-fn of_pad(pad: &Gamepad, mapping: &Mapping) -> Deflection {
+fn of_pad(pad: &Gamepad, bindings: &Bindings, mapping: &Mapping) -> Deflection {
     let axis = |axis| mapping.map(pad.get(axis).unwrap_or(0.0));
     let trigger = |button| mapping.map(pad.get(button).unwrap_or(0.0));
     let [left, right] = [GamepadButton::LeftTrigger2, GamepadButton::RightTrigger2].map(trigger);
-    let [first, second] = COMMAND_BUTTONS.map(|button| f32::from(pad.pressed(button)));
+    let pressed = |steer| f32::from(bindings.steering_button(steer).is_some_and(|button| pad.pressed(button)));
+    let [first, second] = [Steer::Jump, Steer::Flip].map(pressed);
     [axis(GamepadAxis::LeftStickY), -axis(GamepadAxis::LeftStickX), left - right, first, second]
 }
 
 /// The deflection of the keyboard.
-fn of_keys(keys: Option<&ButtonInput<KeyCode>>, by_camera: bool) -> Deflection {
-    let pressed = |key| f32::from(keys.is_some_and(|keys| keys.pressed(key)));
-    let [up, down, left, right, aside_left, aside_right] = STEERING_KEYS.map(pressed);
-    let [first, second] = COMMAND_KEYS.map(pressed);
+fn of_keys(keys: Option<&ButtonInput<KeyCode>>, bindings: &Bindings, by_camera: bool) -> Deflection {
+    let pressed = |steer| {
+        // both shift keys are one
+        let twin = |key| if key == KeyCode::ShiftLeft { KeyCode::ShiftRight } else { key };
+        let key = bindings.steering_key(steer);
+        f32::from(keys.is_some_and(|keys| keys.any_pressed([key, twin(key)])))
+    };
+    let [up, down, left, right] =
+        [Steer::SteerAhead, Steer::SteerBack, Steer::SteerLeft, Steer::SteerRight].map(pressed);
+    let letters = [Steer::MoveAhead, Steer::MoveBack, Steer::MoveLeft, Steer::MoveRight].map(pressed);
+    let [first, second] = [Steer::Jump, Steer::Flip].map(pressed);
     if !by_camera {
-        return [up - down, left - right, aside_left - aside_right, first, second];
+        return [up - down, left - right, letters[2] - letters[3], first, second];
     }
-    let letters = MOVE_KEYS.map(pressed);
     let [up, down, left, right] =
         [up.max(letters[0]), down.max(letters[1]), left.max(letters[2]), right.max(letters[3])];
-    let pace = if RUN_KEYS.map(pressed).contains(&1.0) { 1.0 } else { WALK };
+    let pace = if pressed(Steer::Run) > 0.0 { 1.0 } else { WALK };
     let way = Vec2::new(up - down, left - right).normalize_or_zero() * pace;
     [way.x, way.y, 0.0, first, second]
 }
@@ -251,7 +219,7 @@ fn seen(camera: &Transform, [ahead, left, ..]: Deflection) -> Vec3 {
 }
 
 /// The entries of a command that buttons set, for characters that turn.
-fn buttons(ranges: &[CommandRange]) -> impl Iterator<Item = usize> {
+pub fn buttons(ranges: &[CommandRange]) -> impl Iterator<Item = usize> {
     let turns = ranges.iter().any(CommandRange::is_turn);
     ranges.iter().enumerate().filter(move |(_, range)| turns && range.is_button()).map(|(i, _)| i)
 }
@@ -387,38 +355,14 @@ mod tests {
 
     #[test]
     fn letters_move_by_the_camera_and_step_aside_without() {
-        let mut keys = ButtonInput::<KeyCode>::default();
+        let (bindings, mut keys) = (Bindings::default(), ButtonInput::<KeyCode>::default());
         keys.press(KeyCode::KeyA);
-        assert_eq!(of_keys(Some(&keys), false), [0.0, 0.0, 1.0, 0.0, 0.0]);
-        assert_eq!(of_keys(Some(&keys), true), [0.0, WALK, 0.0, 0.0, 0.0]);
+        assert_eq!(of_keys(Some(&keys), &bindings, false), [0.0, 0.0, 1.0, 0.0, 0.0]);
+        assert_eq!(of_keys(Some(&keys), &bindings, true), [0.0, WALK, 0.0, 0.0, 0.0]);
         keys.press(KeyCode::ShiftLeft);
         keys.press(KeyCode::KeyW);
-        let [ahead, left, ..] = of_keys(Some(&keys), true);
+        let [ahead, left, ..] = of_keys(Some(&keys), &bindings, true);
         assert!((ahead.hypot(left) - 1.0).abs() < 1e-6 && ahead == left);
-        assert_eq!(of_keys(None, true), REST);
-    }
-
-    #[test]
-    fn controls_have_the_names_of_what_they_set() {
-        let range = |name, unit| CommandRange::new(name, 0.0..=1.0, unit);
-        let names = |ranges: &[CommandRange]| {
-            controls(ranges, false).into_iter().map(|c| format!("{}/{}: {}", c.keys, c.pad, c.does)).collect::<Vec<_>>()
-        };
-        let all = [range("speed", "m/s"), range("left", "m/s"), range("turn", "rad/s"), range("jump", "")];
-        let with_all = [
-            "Up Down/left stick: speed",
-            "Left Right/left stick: turn",
-            "A D/triggers: step aside",
-            "Space/A: jump",
-            "V/B: back flip",
-        ];
-        assert_eq!(names(&[&all[..], &[range("back_flip", "")]].concat()), with_all);
-        let planar = ["Left Right/left stick: speed", "Up/left stick up: jump"];
-        assert_eq!(names(&[all[0].clone(), all[3].clone()]), planar);
-        assert_eq!(names(&all[..1]), ["arrows/left stick: speed"]);
-        assert_eq!(names(&all[3..]), ["Up Down/left stick: jump"]);
-        assert!(names(&[]).is_empty());
-        let by_camera = controls(&all, true).into_iter().map(|c| format!("{}: {}", c.keys, c.does)).collect::<Vec<_>>();
-        assert_eq!(by_camera, ["W A S D: move", "Shift: run", "Space: jump"]);
+        assert_eq!(of_keys(None, &bindings, true), REST);
     }
 }

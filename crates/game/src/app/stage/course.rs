@@ -42,6 +42,15 @@ impl PlayerRole {
             PlayerRole::Build => "build",
         }
     }
+
+    /// Its goal, in a line on the screen.
+    pub fn goal(self) -> &'static str {
+        match self {
+            PlayerRole::Watch => "Watch how far the policy gets.",
+            PlayerRole::Run => "Reach the finish without a fall, faster than the best time.",
+            PlayerRole::Build => "Build ground that stops the runner.",
+        }
+    }
 }
 
 /// An assault course, and the player's role.

@@ -2,12 +2,45 @@
 
 use crate::app::mode::Mode;
 use crate::app::stage::clips::follows_clip;
-use crate::app::stage::course::{self, BUILT_AGAINST, LED, PlayerRole};
+use crate::app::stage::course::{self, BUILT_AGAINST, CourseOptions, LED, PlayerRole};
 use crate::app::stage::policies::ShippedPolicies;
 use crate::app::stage::scenario::{PolicySource, Scenario};
+use bevy_marathon::Ground;
+use marathon_runs::TaskConfig;
 
 /// The agent of the mode *imitate* by default. A policy comes with it.
 const FIRST_FOLLOWER: &str = "MarathonManWalk-v0";
+
+/// The character that a player without other wishes has.
+pub const HERO: &str = "MarathonManController-v0";
+/// The agent that the menu lets learn first: its policy walks after seconds.
+const LEARNER: &str = "Hopper-v0";
+/// The runner of the courses of the menu. It observes the ground ahead.
+const RUNNER: &str = "TerrainMarathonMan-v0";
+
+/// The scenario that the main menu starts for a mode: one character with the policy that comes with it, on level ground.
+pub fn fresh_start(scenario: &Scenario, mode: Mode, shipped: &ShippedPolicies) -> Scenario {
+    let agent = match mode {
+        Mode::Learn => LEARNER,
+        Mode::Imitate => FIRST_FOLLOWER,
+        Mode::Course => RUNNER,
+        _ => HERO,
+    };
+    let mut fresh = Scenario {
+        agent: agent.into(),
+        chosen: TaskConfig::default(),
+        source: PolicySource::Shipped,
+        agents: 1,
+        ground: Ground::Level,
+        model: None,
+        ..scenario.clone()
+    };
+    if mode == Mode::Course {
+        fresh.course = CourseOptions { role: PlayerRole::Run, ..CourseOptions::default() };
+    }
+    switch_mode(&mut fresh, mode, shipped);
+    fresh
+}
 
 /// Switches to a mode, as the menu does. An agent that the mode is not possible with makes way for one that is.
 pub fn switch_mode(scenario: &mut Scenario, mode: Mode, shipped: &ShippedPolicies) {

@@ -3,7 +3,7 @@
 
 use crate::app::input::actions::{Action, Steering};
 use crate::app::input::bindings::Bindings;
-use crate::app::input::steering::{Control, controls};
+use crate::app::input::controls::{Control, controls};
 use crate::app::stage::actors::{Actor, Focus};
 use crate::app::stage::scenario::Scenario;
 use crate::app::ui::rewards;
@@ -94,12 +94,13 @@ fn draw(
 ) -> Result {
     let ctx = contexts.ctx_mut()?.clone();
     let room = ctx.content_rect().size();
-    if !hud.on || room.x <= NARROW[0] && !hud.help {
+    let shown = hud.help || hud.is_full() && room.x > NARROW[0];
+    if !hud.on || !shown {
         return Ok(());
     }
     let actor = actors.iter().find(|(actor, _)| actor.0 == focus.0);
     let ranges = actor.and_then(|(_, anatomy)| anatomy.spec.as_ref()).map_or(&[][..], |spec| &spec.command);
-    let controls = if steering.on { controls(ranges, steering.by_camera) } else { Vec::new() };
+    let controls = if steering.on { controls(ranges, steering.by_camera, &bindings) } else { Vec::new() };
     let hints = Hints {
         bindings: &bindings,
         key_hints: &key_hints,
@@ -176,7 +177,7 @@ impl Hints<'_> {
     fn line(&self, width: f32) -> Vec<(String, String)> {
         let steers = |control: &Control| match self.pads {
             true => format!("{} | pad {}", control.keys, control.pad),
-            false => control.keys.to_string(),
+            false => control.keys.clone(),
         };
         let mut line: Vec<_> = self.controls.iter().map(|c| (steers(c), c.does.clone())).collect();
         line.extend(self.keys.mouse.map(|[does, _]| ("mouse".into(), does.into())));
@@ -196,7 +197,7 @@ impl Hints<'_> {
 
     /// All keys and buttons that work now.
     fn rows(&self) -> Vec<Row> {
-        let steers = self.controls.iter().map(|c| (c.keys.to_string(), c.pad.to_string(), c.does.clone()));
+        let steers = self.controls.iter().map(|c| (c.keys.clone(), c.pad.clone(), c.does.clone()));
         let free = self.bindings.free_rows(self.steering).filter(|row| self.works(row.0));
         let free = free.filter(|(_, _, key, button)| key.is_some() || button.is_some());
         let free = free.map(|(action, name, key, button)| {
@@ -270,16 +271,16 @@ mod tests {
         let scenario = cli::scenario(&args, &ShippedPolicies::decode())?;
         let ranges = TaskConfig::named(&scenario.agent)?.factory()?.spec().command.clone();
         let by_camera = MoveDirection::moves(&ranges) && scenario.mode != Mode::Course;
-        let buttons = controls(&ranges, by_camera).iter().any(|control| control.keys == "Space");
-        let steering = Steering { on: !ranges.is_empty(), buttons, by_camera, flying: false };
         let (bindings, key_hints) = (Bindings::default(), features::key_hints());
+        let buttons = controls(&ranges, by_camera, &bindings).iter().any(|control| control.keys == "Space");
+        let steering = Steering { on: !ranges.is_empty(), buttons, by_camera, flying: false };
         let hints = Hints {
             bindings: &bindings,
             key_hints: &key_hints,
             keys: key_hints.of(&scenario),
             several: scenario.agents > 1,
             steering,
-            controls: controls(&ranges, by_camera),
+            controls: controls(&ranges, by_camera, &bindings),
             pads,
         };
         Ok((hints.line(1280.0), hints.rows()))

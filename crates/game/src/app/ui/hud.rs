@@ -10,7 +10,8 @@ use bevy_egui::egui::{self, Align2, Area, Id, Ui};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
 
 pub(super) fn plugin(app: &mut App) {
-    app.add_systems(Update, switch.in_set(AppSet::Input)).add_systems(EguiPrimaryContextPass, draw.in_set(UiSet::Hud));
+    app.add_systems(Update, switch.in_set(AppSet::Input))
+        .add_systems(EguiPrimaryContextPass, draw.in_set(UiSet::Windows));
 }
 
 fn switch(mut actions: MessageReader<ActionPressed>, mut hud: ResMut<Hud>) {

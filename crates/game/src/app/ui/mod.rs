@@ -1,8 +1,10 @@
 //! Text, bars, the menu and questions over the picture.
 
+pub mod glyphs;
 pub mod hints;
 pub mod hud;
 pub mod menu;
+pub mod prompts;
 pub mod question;
 pub mod rewards;
 pub mod status;
@@ -18,6 +20,7 @@ pub(super) fn plugin(app: &mut App) {
         rewards::plugin,
         hints::plugin,
         menu::plugin,
+        prompts::plugin,
         question::plugin,
     ));
 }

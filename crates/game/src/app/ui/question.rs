@@ -1,7 +1,8 @@
 //! Questions before something is lost: a key that would discard a policy asks first, and so does the end of the game.
 
 use crate::app::input::actions::{Action, ActionPressed, ActionRequested};
-use crate::app::input::bindings::{self, Bindings};
+use crate::app::input::bindings::Bindings;
+use crate::app::input::rebind::RebindSet;
 use crate::app::input::scripted;
 use crate::app::mode::Mode;
 use crate::app::ui::theme::{FAINT, TEXT, UiSet, text};
@@ -54,7 +55,7 @@ pub(in crate::app) fn gate_plugin(app: &mut App) {
         .add_message::<DiscardPolicy>()
         .add_message::<StartConfirmed>()
         .configure_sets(PreUpdate, ReportSet.before(gate))
-        .add_systems(PreUpdate, gate.after(bindings::rebind).after(scripted::request_actions));
+        .add_systems(PreUpdate, gate.after(RebindSet).after(scripted::request_actions));
 }
 
 /// Adds the window of the question.
@@ -190,11 +191,15 @@ pub fn draw(
     window.order(egui::Order::Foreground).show(&ctx, |ui| {
         ui.label(text(15.0, TEXT, words));
         ui.add_space(8.0);
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
+            let focused = ui.memory(|memory| memory.focused());
+            let mut ours = Vec::new();
             let mut offer = |label: String, choice: Answer| {
-                if ui.add(Button::new(text(14.0, TEXT, label))).clicked() {
+                let button = ui.add(Button::new(text(14.0, TEXT, label)));
+                if button.clicked() {
                     answer = Some(choice);
                 }
+                ours.push(button);
             };
             if savable {
                 offer(format!("Save first{}", key(Action::Save)), Answer::Save);
@@ -203,6 +208,12 @@ pub fn draw(
                 offer(format!("{does}{again}"), Answer::Yes);
             }
             offer(format!("Back{}", key(Action::Menu)), Answer::Back);
+            // a gamepad answers, too
+            if !ours.iter().any(|button| Some(button.id) == focused)
+                && let Some(last) = ours.last()
+            {
+                last.request_focus();
+            }
         });
         if savable {
             ui.label(text(12.0, FAINT, "A saved policy plays again; its training does not go on."));

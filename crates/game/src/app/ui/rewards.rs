@@ -79,7 +79,7 @@ pub fn draw(
     actors: Query<(&Actor, &Anatomy, &Episode)>,
 ) -> Result {
     // on a course the player looks at the ground ahead
-    if !hud.on || *mode == Mode::Course {
+    if !hud.is_full() || *mode == Mode::Course {
         return Ok(());
     }
     let Some((_, anatomy, episode)) = actors.iter().find(|(actor, ..)| actor.0 == focus.0) else { return Ok(()) };

@@ -3,10 +3,9 @@
 use crate::app::mode::{AppSet, Mode};
 use crate::app::stage::actors::{Actor, Focus};
 use crate::app::stage::scenario::Scenario;
-use crate::app::ui::hud;
-use crate::app::ui::theme::{ACCENT, BAD, FAINT, Hud, TEXT, UiSet, card, line, spaced, text};
+use crate::app::ui::theme::{ACCENT, BAD, FAINT, Hud, TEXT, UiSet, card, line, spaced, status_id, text};
 use bevy::prelude::*;
-use bevy_egui::egui::{self, Align2, Area, Color32, Id, Sense, Ui};
+use bevy_egui::egui::{self, Align2, Area, Color32, Sense, Ui};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
 use bevy_marathon::look::commanded_velocity;
 use bevy_marathon::{AgentCommand, Anatomy, Episode, Marathon};
@@ -43,6 +42,22 @@ pub struct Pace {
     measured: Option<f32>,
 }
 
+impl Rates {
+    /// The speed of time, and the rates of decisions and frames, for the screen.
+    fn text(&self, time: &Time<Virtual>, mode: Mode, fps: f32) -> String {
+        let speed = match time.is_paused() {
+            true => "paused".into(),
+            false => self.pace.text(time.relative_speed()),
+        };
+        // another program makes the decisions
+        let decisions = match mode.is_simulated() {
+            true => format!("{:.0} decisions/s   ", self.decisions),
+            false => String::new(),
+        };
+        format!("{speed}   {decisions}{fps:.0} fps")
+    }
+}
+
 impl Pace {
     /// Adds a frame: the time factor that is set, and the frame's real and game seconds.
     fn take_in(&mut self, wanted: f32, real: f64, game: f64) {
@@ -72,7 +87,7 @@ pub(super) fn plugin(app: &mut App) {
         .init_resource::<StatusLines>()
         .add_systems(First, |mut lines: ResMut<StatusLines>| lines.0.clear())
         .add_systems(Update, measure.in_set(AppSet::Present))
-        .add_systems(EguiPrimaryContextPass, draw.in_set(UiSet::Hud).after(hud::draw));
+        .add_systems(EguiPrimaryContextPass, draw.in_set(UiSet::Hud));
 }
 
 /// Measures the decisions per second of all characters, and the time factor.
@@ -122,8 +137,7 @@ pub fn draw(
     *smooth = if *smooth > 0.0 { *smooth + 0.05 * (delta - *smooth) } else { delta };
     let actor = actors.iter().find(|(a, ..)| a.0 == focus.0);
     if let Some((_, anatomy, episode, command)) = actor {
-        let steered = command.is_some_and(|command| command.values().is_some());
-        Area::new(Id::new("who")).anchor(Align2::LEFT_TOP, [14.0, 14.0]).interactable(false).show(&ctx, |ui| {
+        Area::new(status_id()).anchor(Align2::LEFT_TOP, [14.0, 14.0]).interactable(false).show(&ctx, |ui| {
             card().show(ui, |ui| {
                 let of = if scenario.agents > 1 {
                     format!("  {} of {}", focus.0 + 1, scenario.agents)
@@ -136,6 +150,11 @@ pub fn draw(
                     ui.label(text(13.0, ACCENT, scenario.mode.name()));
                     ui.label(text(12.0, FAINT, of));
                 });
+                let goal = match scenario.mode {
+                    Mode::Course => scenario.course.role.goal(),
+                    mode => mode.goal(),
+                };
+                line(ui, text(13.0, FAINT, goal));
                 if let Some(spec) = &anatomy.spec {
                     ui.horizontal(|ui| {
                         // rounded first: there is no -0.0 m/s
@@ -147,37 +166,16 @@ pub fn draw(
                         ui.label(text(30.0, TEXT, format!("{distance:.1}")).strong());
                         ui.label(text(14.0, FAINT, "m"));
                     });
-                    let state = if episode.down { "  fallen" } else { "" };
-                    let Episode { number, seconds, total, .. } = episode;
-                    let run = format!("episode {number}   {seconds:.1} s   return {total:.0}{state}");
-                    line(ui, text(13.0, if episode.down { BAD } else { FAINT }, run));
                 }
-                if let Some(spec) = &anatomy.spec {
-                    for (range, x) in spec.command.iter().zip(&episode.command) {
-                        let by = match (scenario.mode, steered) {
-                            (Mode::Replay, _) => "",
-                            (_, true) => "   by you",
-                            (_, false) => "   by its schedule",
-                        };
-                        let words =
-                            format!("{}: {} {}{by}", range.name.replace('_', " "), spaced(*x as f32), range.unit);
-                        line(ui, text(13.0, if steered { ACCENT } else { FAINT }, words));
-                    }
-                    adversary(ui, spec, episode);
+                let steered = command.is_some_and(|command| command.values().is_some());
+                if hud.is_full() {
+                    let fps = if *smooth > 0.0 { 1.0 / *smooth } else { 0.0 };
+                    numbers(ui, scenario.mode, anatomy, episode, steered);
+                    clip(ui, anatomy, episode);
+                    line(ui, text(12.0, FAINT, rates.text(&time, scenario.mode, fps)));
+                } else if time.is_paused() {
+                    line(ui, text(13.0, ACCENT, "paused"));
                 }
-                clip(ui, anatomy, episode);
-                let speed = match time.is_paused() {
-                    true => "paused".into(),
-                    false => rates.pace.text(time.relative_speed()),
-                };
-                let fps = if *smooth > 0.0 { 1.0 / *smooth } else { 0.0 };
-                // another program makes the decisions
-                let decisions = match scenario.mode.is_simulated() {
-                    true => format!("{:.0} decisions/s   ", rates.decisions),
-                    false => String::new(),
-                };
-                let rates = format!("{speed}   {decisions}{fps:.0} fps");
-                line(ui, text(12.0, FAINT, rates));
                 for (color, words) in &lines.0 {
                     line(ui, text(13.0, *color, words));
                 }
@@ -185,6 +183,25 @@ pub fn draw(
         });
     }
     Ok(())
+}
+
+/// The numbers of the episode, and the command.
+fn numbers(ui: &mut Ui, mode: Mode, anatomy: &Anatomy, episode: &Episode, steered: bool) {
+    let Some(spec) = &anatomy.spec else { return };
+    let state = if episode.down { "  fallen" } else { "" };
+    let Episode { number, seconds, total, .. } = episode;
+    let run = format!("episode {number}   {seconds:.1} s   return {total:.0}{state}");
+    line(ui, text(13.0, if episode.down { BAD } else { FAINT }, run));
+    for (range, x) in spec.command.iter().zip(&episode.command) {
+        let by = match (mode, steered) {
+            (Mode::Replay, _) => "",
+            (_, true) => "   by you",
+            (_, false) => "   by its schedule",
+        };
+        let words = format!("{}: {} {}{by}", range.name.replace('_', " "), spaced(*x as f32), range.unit);
+        line(ui, text(13.0, if steered { ACCENT } else { FAINT }, words));
+    }
+    adversary(ui, spec, episode);
 }
 
 /// The commands of another role of the task, if the task reports them: `told_velocity` and the like.

@@ -1,5 +1,8 @@
 //! The look of text and cards, and the order in which they are drawn.
 
+use crate::app::input::actions::KeysFor;
+use crate::app::mode::AppSet;
+use crate::app::settings::values::{Detail, Settings, TEXT_SIZE};
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, Area, Color32, CornerRadius, FontFamily, FontId, Frame, Id, Margin, RichText, Ui};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
@@ -20,6 +23,8 @@ pub const BAD: Color32 = Color32::from_rgb(255, 106, 96);
 const FULL: [f32; 2] = [1000.0, 600.0];
 /// Smallest scale at which text can be read.
 const SMALLEST: f32 = 0.66;
+/// Smallest picture in which larger text fits, points: in a small window, text grows no further.
+const LEAST: [f32; 2] = [760.0, 430.0];
 
 /// The text and bars over the picture.
 #[derive(Resource, Clone, Copy, Debug)]
@@ -28,11 +33,20 @@ pub struct Hud {
     pub on: bool,
     /// All keys.
     pub help: bool,
+    /// How much of it.
+    pub detail: Detail,
 }
 
 impl Default for Hud {
     fn default() -> Self {
-        Hud { on: true, help: false }
+        Hud { on: true, help: false, detail: Detail::Full }
+    }
+}
+
+impl Hud {
+    /// Whether the numbers of task, policy and reward are shown.
+    pub fn is_full(&self) -> bool {
+        self.on && self.detail == Detail::Full
     }
 }
 
@@ -51,8 +65,20 @@ pub enum UiSet {
 
 pub(super) fn plugin(app: &mut App) {
     app.init_resource::<Hud>()
+        .add_systems(Update, follow_settings.run_if(resource_changed::<Settings>).in_set(AppSet::Present))
         .configure_sets(EguiPrimaryContextPass, (UiSet::Prepare, UiSet::Hud, UiSet::Panels, UiSet::Windows).chain())
+        // a menu is alone on the screen
+        .configure_sets(EguiPrimaryContextPass, (UiSet::Hud, UiSet::Panels).run_if(not(resource_equals(KeysFor::Menu))))
         .add_systems(EguiPrimaryContextPass, (style, fit).chain().in_set(UiSet::Prepare));
+}
+
+/// Shows as much as the player has chosen. A key may hide it for a while.
+fn follow_settings(settings: Res<Settings>, mut hud: ResMut<Hud>) {
+    let detail = settings.interface.detail;
+    if hud.detail != detail {
+        hud.detail = detail;
+        hud.on = detail != Detail::Nothing;
+    }
 }
 
 /// Sets the look of menus and sliders.
@@ -75,11 +101,14 @@ fn style(mut contexts: EguiContexts, mut done: Local<bool>) -> Result {
     Ok(())
 }
 
-/// Scales text and bars to the picture.
-fn fit(mut contexts: EguiContexts, cameras: Query<&Camera, With<FollowCamera>>) -> Result {
+/// Scales text and bars to the picture, and to the size of text that the player has chosen.
+fn fit(mut contexts: EguiContexts, settings: Res<Settings>, cameras: Query<&Camera, With<FollowCamera>>) -> Result {
     let ctx = contexts.ctx_mut()?;
     if let Some(size) = cameras.iter().next().and_then(Camera::logical_viewport_size) {
-        ctx.set_zoom_factor((size.x / FULL[0]).min(size.y / FULL[1]).clamp(SMALLEST, 1.0));
+        let fits = (size.x / FULL[0]).min(size.y / FULL[1]).clamp(SMALLEST, 1.0);
+        let chosen = settings.interface.text_size.clamp(*TEXT_SIZE.start(), *TEXT_SIZE.end());
+        let most = (size.x / LEAST[0]).min(size.y / LEAST[1]).max(fits);
+        ctx.set_zoom_factor((fits * chosen).min(most));
     }
     Ok(())
 }
@@ -94,9 +123,20 @@ pub fn panel_id() -> Id {
     Id::new("panel")
 }
 
-/// Draws a card at the upper right: the panel of the current mode.
+/// The name of the area of the card at the upper left.
+pub fn status_id() -> Id {
+    Id::new("who")
+}
+
+/// Draws a card at the upper right: the panel of the current mode. Where there is no room for it, it is below the card at the
+/// left.
 pub fn panel(ctx: &egui::Context, interactable: bool, draw: impl FnOnce(&mut Ui)) {
-    let area = Area::new(panel_id()).anchor(Align2::RIGHT_TOP, [-14.0, 14.0]).interactable(interactable);
+    let rect = |id| ctx.memory(|memory| memory.area_rect(id));
+    let status = rect(status_id());
+    let width = rect(panel_id()).map_or(0.0, |panel| panel.width());
+    let crowded = status.filter(|status| status.right() + width + 22.0 > ctx.content_rect().right());
+    let top = crowded.map_or(14.0, |status| status.bottom() + 8.0);
+    let area = Area::new(panel_id()).anchor(Align2::RIGHT_TOP, [-14.0, top]).interactable(interactable);
     area.show(ctx, |ui| card().show(ui, draw));
 }
 

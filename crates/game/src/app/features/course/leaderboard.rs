@@ -95,6 +95,8 @@ pub struct Place {
     pub longest: f64,
     /// See there.
     pub shortest: f64,
+    /// The shortest time of a run through the whole course, s.
+    pub fastest: Option<f64>,
 }
 
 /// The table of the longest runs.
@@ -330,8 +332,8 @@ fn insert(begun: &Transaction<'_>, run: &Run) -> rusqlite::Result<Option<i64>> {
 }
 
 fn place(connection: &Connection, course: &Course, distance: f64) -> rusqlite::Result<Place> {
-    let query =
-        "SELECT count(*) FILTER (WHERE distance > :distance) + 1, count(*), max(distance), min(distance) FROM runs
+    let query = "SELECT count(*) FILTER (WHERE distance > :distance) + 1, count(*), max(distance), min(distance),
+                min(seconds) FILTER (WHERE ended = 'through') FROM runs
          WHERE agent = :agent AND course = :kind AND difficulty = :difficulty AND part = :part";
     let Course { agent, kind, difficulty, role } = course;
     let of = named_params! {
@@ -340,7 +342,7 @@ fn place(connection: &Connection, course: &Course, distance: f64) -> rusqlite::R
     connection.query_row(query, of, |row| {
         let [rank, count] = [row.get::<_, i64>(0)?, row.get(1)?].map(|x| x as usize);
         let [longest, shortest] = [row.get::<_, Option<f64>>(2)?, row.get(3)?].map(Option::unwrap_or_default);
-        Ok(Place { rank, of: count, longest, shortest })
+        Ok(Place { rank, of: count, longest, shortest, fastest: row.get(4)? })
     })
 }
 
@@ -353,10 +355,12 @@ fn prune(begun: &Transaction<'_>, course: &Course) -> rusqlite::Result<Vec<Strin
     let files = format!("SELECT replay FROM runs WHERE replay IS NOT NULL AND id IN {BEYOND}");
     let gone = begun.prepare(&files)?.query_map(of(KEPT), |row| row.get(0))?.collect::<rusqlite::Result<_>>()?;
     begun.execute(&format!("UPDATE runs SET replay = NULL WHERE id IN {BEYOND}"), of(KEPT))?;
-    // builders look for the shortest
-    let shortest = "(SELECT id FROM runs WHERE agent = ?1 AND course = ?2 AND difficulty = ?3 AND part = ?4
-         ORDER BY distance, id LIMIT 1)";
-    begun.execute(&format!("DELETE FROM runs WHERE id IN {BEYOND} AND id NOT IN {shortest}"), of(ROWS))?;
+    // builders look for the shortest, and runners for the best time
+    const HERE: &str = "(SELECT id FROM runs WHERE agent = ?1 AND course = ?2 AND difficulty = ?3 AND part = ?4";
+    let shortest = format!("{HERE} ORDER BY distance, id LIMIT 1)");
+    let fastest = format!("{HERE} AND ended = 'through' ORDER BY seconds, id LIMIT 1)");
+    let rest = format!("id IN {BEYOND} AND id NOT IN {shortest} AND id NOT IN {fastest}");
+    begun.execute(&format!("DELETE FROM runs WHERE {rest}"), of(ROWS))?;
     Ok(gone)
 }
 

@@ -2,6 +2,7 @@
 //! ended enter the [table](leaderboard) of the longest.
 
 mod builder;
+mod gates;
 pub mod leaderboard;
 mod runs;
 mod ui;
@@ -16,7 +17,7 @@ use crate::app::ui::hints::{KeyHints, ModeKeys};
 use bevy::prelude::*;
 
 pub(super) fn plugin(app: &mut App) {
-    app.add_plugins((builder::plugin, runs::plugin, ui::plugin));
+    app.add_plugins((builder::plugin, gates::plugin, runs::plugin, ui::plugin));
 }
 
 pub(super) fn key_hints(hints: &mut KeyHints) {

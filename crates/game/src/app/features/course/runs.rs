@@ -21,9 +21,15 @@ use std::time::Duration;
 
 /// Shorter runs are not kept, m.
 pub const LEAST: f64 = 1.0;
+/// The end of a run at the finish.
+const THROUGH: &str = "through";
 /// Limits of the referee, as in the tasks on courses: time without a new meter, s, and distance from the edge, m.
 const PATIENCE: f64 = 5.0;
 const EDGE: f64 = 0.2;
+/// Distances of the checkpoints, m. The last one is the finish.
+pub const GATES: [f64; 4] = [0.25 * FINISH, 0.5 * FINISH, 0.75 * FINISH, FINISH];
+/// Distance of the finish, m: the tasks on courses end there.
+const FINISH: f64 = TO - 2.0;
 /// Longest recording, frames.
 const LONGEST: usize = 60_000;
 
@@ -49,6 +55,8 @@ struct UnderWay {
     slowest: f64,
     /// Its distance at the first decision, as its task reports it, m.
     start: Option<f64>,
+    /// Its times at the gates that it has passed, s.
+    gates: Vec<f64>,
     /// Full meters made, and when the last one was, s.
     meters: f64,
     since: f64,
@@ -111,6 +119,11 @@ impl Runs {
         self.under_way.iter().find(|run| run.ragdoll == ragdoll)?.start
     }
 
+    /// Times of a character at the gates that it has passed in its run, s.
+    pub fn gates(&self, ragdoll: Entity) -> &[f64] {
+        self.under_way.iter().find(|run| run.ragdoll == ragdoll).map_or(&[], |run| &run.gates)
+    }
+
     /// Adds a run that has ended.
     fn finish(&mut self, run: Run, recording: &Recording, notes: &mut Notifications) {
         let added = self.path().and_then(|path| Table::open(&path)?.add(&run, recording));
@@ -119,6 +132,11 @@ impl Runs {
             Ok(place) => {
                 // the card tells it on the screen
                 info!("{result}: place {} of {}", place.rank, place.of);
+                if run.ended == THROUGH {
+                    let best = place.fastest.is_some_and(|fastest| run.seconds <= fastest);
+                    let best = if best { ", the best time" } else { "" };
+                    notes.say(format!("finish after {:.2} s{best}", run.seconds));
+                }
                 self.standing = Some(place);
                 self.last = Some((run, place));
             }
@@ -183,6 +201,7 @@ fn follow(
                     until: sample.time,
                     slowest: pace,
                     start: None,
+                    gates: Vec::new(),
                     meters: 0.0,
                     since: 0.0,
                     verdict: None,
@@ -200,6 +219,10 @@ fn follow(
             let index = anatomy.spec.as_ref().and_then(|spec| spec.info.iter().position(|name| name == "distance"));
             let distance = index.and_then(|i| episode.info.get(i)).map(|x| f64::from(*x));
             run.start = run.start.or(distance);
+            let fresh = history.back().is_some_and(|sample| sample.fresh);
+            while !run.over && !fresh && GATES.get(run.gates.len()).is_some_and(|gate| episode.farthest >= *gate) {
+                run.gates.push(episode.seconds);
+            }
         }
         for EpisodeEnded { end, episode, .. } in
             ended.iter().filter(|ended| ended.ragdoll == entity && ended.end != End::Broke)
@@ -248,7 +271,7 @@ fn verdict(end: End, episode: &Episode, anatomy: &Anatomy) -> &'static str {
         End::Asked => "given up",
         End::Broke => "broke",
         End::TimeUp if episode.decisions as usize >= most => "time up",
-        End::TimeUp if episode.farthest > TO - 2.0 => "through",
+        End::TimeUp if episode.farthest > FINISH => THROUGH,
         End::TimeUp => "stuck",
     }
 }
@@ -272,7 +295,7 @@ fn referee(
         }
         let aside = newest.qpos.get(1).filter(|_| newest.qpos.len() > newest.qvel.len()).map_or(0.0, |y| y.abs());
         run.verdict = match () {
-            () if episode.farthest > TO - 1.0 => Some("through"),
+            () if episode.farthest > FINISH => Some(THROUGH),
             () if aside > TRACK_HALF_WIDTH - EDGE => Some("off the edge"),
             // a player may look around before the first meter
             () if run.meters > 0.0 && episode.seconds - run.since > PATIENCE => Some("stuck"),

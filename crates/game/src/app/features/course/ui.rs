@@ -3,7 +3,7 @@
 use crate::app::error::GameError;
 use crate::app::features::course::builder::{MOST_STEPS, Step};
 use crate::app::features::course::leaderboard::{Course, KEPT, Place, Run, Table};
-use crate::app::features::course::runs::{Runs, course, names};
+use crate::app::features::course::runs::{GATES, Runs, course, names};
 use crate::app::input::actions::{Action, ActionPressed};
 use crate::app::mode::{AppSet, Mode};
 use crate::app::notifications::Notifications;
@@ -12,7 +12,7 @@ use crate::app::stage::course::PlayerRole;
 use crate::app::stage::loaded::LoadedPolicy;
 use crate::app::stage::recording::PlayRecording;
 use crate::app::stage::scenario::{LoadScenario, Scenario};
-use crate::app::ui::menu;
+use crate::app::ui::menu::state::Overlay;
 use crate::app::ui::theme::{ACCENT, BAD, FAINT, Hud, TEXT, UiSet, line, panel, text};
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, Ui};
@@ -44,6 +44,9 @@ pub struct List {
 pub(super) fn plugin(app: &mut App) {
     app.init_resource::<List>()
         .add_systems(Update, control.in_set(AppSet::Input))
+        .add_systems(PreUpdate, |list: Res<List>, mut overlay: ResMut<Overlay>| {
+            overlay.set_if_neq(Overlay(list.open));
+        })
         .add_systems(
             Update,
             close.run_if(on_message::<LoadScenario>).run_if(in_state(Mode::Replay)).in_set(AppSet::Present),
@@ -52,7 +55,8 @@ pub(super) fn plugin(app: &mut App) {
             EguiPrimaryContextPass,
             (
                 draw.run_if(in_state(Mode::Course)).in_set(UiSet::Panels),
-                draw_list.in_set(UiSet::Windows).before(menu::draw),
+                // below the menus
+                draw_list.in_set(UiSet::Panels),
             ),
         );
 }
@@ -85,7 +89,12 @@ fn control(
     mut replays: MessageWriter<PlayRecording>,
     mut notes: ResMut<Notifications>,
 ) {
-    for _ in actions.read().filter(|action| action.0 == Action::Runs) {
+    let mut closed = false;
+    for ActionPressed(action) in actions.read() {
+        closed |= *action == Action::Menu;
+        if *action != Action::Runs {
+            continue;
+        }
         list.open = !list.open;
         if list.open
             && let Err(error) = list.read(&runs, &scenario)
@@ -93,6 +102,9 @@ fn control(
             list.open = false;
             notes.error(error.to_string());
         }
+    }
+    if list.open && closed {
+        list.open = false;
     }
     let place = PLACES.iter().position(|key| keys.just_pressed(*key)).filter(|_| list.open);
     if let Some(place) = place {
@@ -118,12 +130,12 @@ fn draw(
     mut contexts: EguiContexts,
     (hud, scenario, loaded): (Res<Hud>, Res<Scenario>, Res<LoadedPolicy>),
     (runs, step, focus): (Res<Runs>, Res<Step>, Res<Focus>),
-    actors: Query<(&Actor, &Episode)>,
+    actors: Query<(Entity, &Actor, &Episode)>,
 ) -> Result {
     if !hud.on {
         return Ok(());
     }
-    let Some((_, episode)) = actors.iter().find(|(actor, _)| actor.0 == focus.0) else { return Ok(()) };
+    let Some((ragdoll, _, episode)) = actors.iter().find(|(_, actor, _)| actor.0 == focus.0) else { return Ok(()) };
     let ctx = contexts.ctx_mut()?.clone();
     panel(&ctx, false, |ui| {
         let course = course(&scenario);
@@ -141,6 +153,9 @@ fn draw(
                 ui.label(text(14.0, FAINT, "m   best"));
             }
         });
+        if !scenario.is_built() {
+            times(ui, episode, runs.gates(ragdoll), runs.standing.and_then(|standing| standing.fastest));
+        }
         let [runner, builder] = names(&scenario, &loaded, runs.player());
         line(ui, text(13.0, FAINT, format!("runs: {runner}")));
         if builder != "seed" {
@@ -164,6 +179,26 @@ fn draw(
         }
     });
     Ok(())
+}
+
+/// The time of the run, the checkpoints that it has passed, and the best time.
+fn times(ui: &mut Ui, episode: &Episode, gates: &[f64], fastest: Option<f64>) {
+    ui.horizontal(|ui| {
+        ui.label(text(20.0, TEXT, format!("{:.1}", episode.seconds)).strong());
+        ui.label(text(14.0, FAINT, "s"));
+        if let Some(fastest) = fastest {
+            ui.add_space(8.0);
+            ui.label(text(20.0, ACCENT, format!("{fastest:.1}")).strong());
+            ui.label(text(14.0, FAINT, "s   best time"));
+        }
+    });
+    let next = match GATES.get(gates.len()) {
+        Some(gate) if gates.len() + 1 == GATES.len() => format!("finish at {gate:.0} m"),
+        Some(gate) => format!("checkpoint {} of {} at {gate:.0} m", gates.len() + 1, GATES.len() - 1),
+        None => "finished".into(),
+    };
+    let last = gates.last().map(|at| format!("   last one after {at:.1} s")).unwrap_or_default();
+    line(ui, text(13.0, TEXT, format!("{next}{last}")));
 }
 
 /// Draws the list.

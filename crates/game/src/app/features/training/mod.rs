@@ -31,7 +31,13 @@ pub(super) fn plugin(app: &mut App) {
         .add_systems(Update, (discard, control).chain().in_set(AppSet::Input).after(ControlSet))
         .add_systems(
             Update,
-            (sync_run.run_if(in_state(Mode::Learn)), keep_pace.run_if(resource_exists::<IsVideo>), apply_policy, log)
+            (
+                sync_run.run_if(in_state(Mode::Learn)),
+                follow_pause,
+                keep_pace.run_if(resource_exists::<IsVideo>),
+                apply_policy,
+                log,
+            )
                 .chain()
                 .in_set(AppSet::Simulate)
                 .after(spawn),
@@ -64,8 +70,7 @@ fn discard(mut discards: MessageReader<DiscardPolicy>, run: Option<Res<TrainingR
     }
 }
 
-/// Pauses, saves, restarts and ends the run.
-#[expect(clippy::too_many_arguments, reason = "a system names what it uses")]
+/// Saves, restarts and ends the run.
 fn control(
     mut commands: Commands,
     mut actions: MessageReader<ActionPressed>,
@@ -73,12 +78,10 @@ fn control(
     shipped: Res<ShippedPolicies>,
     mut loads: MessageWriter<LoadScenario>,
     run: Option<Res<TrainingRun>>,
-    time: Res<Time<Virtual>>,
     mut notes: ResMut<Notifications>,
 ) {
     for ActionPressed(action) in actions.read() {
         match (action, &run) {
-            (Action::Pause, Some(run)) => run.pause(time.is_paused()),
             (Action::Save, Some(run)) => run.save("", &mut notes),
             (Action::Restart, Some(run)) if scenario.mode == Mode::Learn => {
                 run.finish(&mut notes);
@@ -94,6 +97,18 @@ fn control(
             }
             _ => {}
         }
+    }
+}
+
+/// The trainer stands still with time.
+fn follow_pause(run: Option<Res<TrainingRun>>, time: Res<Time<Virtual>>, mut before: Local<bool>) {
+    let Some(run) = run else {
+        *before = false;
+        return;
+    };
+    if *before != time.is_paused() {
+        *before = time.is_paused();
+        run.pause(*before);
     }
 }
 
