@@ -4,19 +4,16 @@
 //! kind has a clock, ahead of the game's by at most one decision, so that a frame always lies between two states.
 
 mod batch;
+mod detector;
+mod event;
+mod power;
 mod saved;
 mod sleep;
 mod slot;
 
 pub(crate) use batch::CharacterBatch;
-pub(crate) use saved::{KindIdentity, LaneState};
-mod detector;
-mod event;
-mod power;
-mod slot;
-
-pub(crate) use batch::CharacterBatch;
 pub(crate) use event::Event;
+pub(crate) use saved::{KindIdentity, LaneState};
 pub use slot::PoseSample;
 pub(crate) use slot::{Shove, Slot};
 

@@ -5,7 +5,8 @@
 
 use crate::look::blobs::soft_disc;
 use crate::look::quality::Quality;
-use crate::ragdoll::{Anatomy, Episode, FootContact};
+use crate::messages::FootContact;
+use crate::ragdoll::{Anatomy, Episode};
 use bevy::light::{NotShadowCaster, NotShadowReceiver};
 use bevy::prelude::*;
 
