@@ -9,7 +9,7 @@ use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_marathon::prelude::*;
 use marathon_game::app::{
-    Action, ActionPressed, Actor, Dragged, FilmProgram, FilmReel, Limp, Notifications, PlaySound, Recording, Sound,
+    Action, ActionPressed, Actor, Dragged, FilmProgram, FilmReel, Notifications, PlaySound, Recording, Sound,
 };
 use std::error::Error;
 use std::path::PathBuf;
@@ -115,8 +115,8 @@ fn a_limp_character_collapses_and_gets_its_strength_back() {
     frames(&mut app, 30);
     let standing = trunk(&mut app).y;
     act(&mut app, Action::Limp);
-    let mut limp = app.world_mut().query_filtered::<&Physique, (With<Limp>, With<Actor>)>();
-    assert!(limp.single(app.world()).expect("it is limp").0.strength.iter().all(|strength| *strength == 0.0));
+    let mut mode = app.world_mut().query_filtered::<&RagdollMode, With<Actor>>();
+    assert_eq!(mode.single(app.world()).copied().ok(), Some(RagdollMode::Limp));
     let mut lowest = f32::MAX;
     for _ in 0..60 {
         app.update();
@@ -124,8 +124,12 @@ fn a_limp_character_collapses_and_gets_its_strength_back() {
     }
     assert!(lowest < 0.6 * standing, "from {standing} m down to {lowest} m");
     act(&mut app, Action::Limp);
-    let mut strong = app.world_mut().query_filtered::<&Physique, (Without<Limp>, With<Actor>)>();
-    assert!(strong.single(app.world()).expect("it is strong").0.strength.iter().all(|strength| *strength == 1.0));
+    let mut up = false;
+    for _ in 0..600 {
+        app.update();
+        up |= trunk(&mut app).y > 0.85 * standing && mode.single(app.world()).is_ok_and(|m| *m == RagdollMode::Powered);
+    }
+    assert!(up, "it has not got up in 10 s");
 }
 
 #[test]

@@ -30,7 +30,6 @@ pub use features::course::{List, MOST_STEPS, Runs, Site, Step};
 pub use features::drag::Dragged;
 pub use features::film::{FilmProgram, FilmReel};
 pub use features::imitation::{GhostAt, Imitation, Reading};
-pub use features::limp::Limp;
 pub use features::perturb::{Ball, Perturbations};
 pub use features::remote::{Mailbox, RemotePose, RemoteSource};
 pub use features::replay::play::Playback;
