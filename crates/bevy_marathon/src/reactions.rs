@@ -129,7 +129,7 @@ impl Blows {
 }
 
 impl Blow {
-    /// What it takes from the strength of its body now, 0 to 1.
+    /// Strength that its body lacks now, 0 to 1.
     fn softening(&self, reactions: &HitReactions, dt: f64) -> f64 {
         let fades = (self.age as f64 * dt - reactions.hold).max(0.0);
         self.depth * libm::exp2(-fades / reactions.half_life.max(f64::MIN_POSITIVE))

@@ -54,7 +54,7 @@ struct Seen {
     knee: f32,
 }
 
-/// What the measures of a character are in a part of the course.
+/// Measures of a character in a part of the course.
 #[derive(Debug, Default)]
 struct Measures {
     /// Level speeds of settled feet, m/s.

@@ -17,7 +17,7 @@ const PITCH: [f32; 2] = [-0.1745, FRAC_PI_3];
 const FREE_PITCH: f32 = 1.5;
 /// Closest and farthest [`FollowCamera::zoom`], m.
 const DISTANCE: [f32; 2] = [0.6, 60.0];
-/// What the field of view opens by at a full run, rad: 6 degrees.
+/// Growth of the field of view up to a full run, rad: 6 degrees.
 const WIDER: f32 = 0.1047;
 /// Distance of things that are still drawn, m.
 const FAR: f32 = 1000.0;
@@ -123,7 +123,7 @@ pub struct FollowCamera {
     /// Whether it moves only as its target and the player move it: no turn of its own, and the same distance and field of view at
     /// every speed.
     pub reduced_motion: bool,
-    /// What it remembers from frame to frame.
+    /// Its state between frames.
     #[reflect(ignore)]
     motion: Motion,
     /// It is to get behind its target at once.

@@ -28,7 +28,7 @@ const BENT: f64 = 0.005;
 const SINK: [f64; 2] = [0.03, 0.15];
 /// Largest change of the knee's angle by the lock, rad/s: 2.5 degrees in a frame of 1/60 s.
 const KNEE_RATE: f64 = 2.6;
-/// Way of a foot in one frame after which it begins anew, m.
+/// Distance that a foot moves in one frame from which on the lock starts again, m.
 const CUT: f64 = 0.5;
 /// Longest frame with locked feet, s: in fast motion they would lag behind.
 const LONGEST: f64 = 0.1;
@@ -97,7 +97,7 @@ struct State {
     off: f64,
     /// Height of the lowest point of the sole at the last contact, m.
     floor: f64,
-    /// What the lock opens the knee by, rad.
+    /// Angle by which the lock opens the knee, rad.
     opened: f64,
     /// Axis of the knee in the frame of the shin's bone.
     axis: Option<DVec3>,

@@ -42,7 +42,7 @@ const OUT: f32 = 9.2;
 /// Cosine of the tilt up to which a target counts as upright.
 const UPRIGHT: f32 = 0.7;
 
-/// What a camera sees of its target in a frame.
+/// The target of a camera in a frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sight {
     /// Seconds of the picture's own time: a player looks about while the game's stands still.
@@ -109,7 +109,7 @@ impl Sight {
     }
 }
 
-/// What a camera remembers from frame to frame.
+/// The state of a camera between frames.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Motion {
     /// Whom it followed in the last frame, and where that was. None: the next frame jumps.

@@ -72,8 +72,8 @@ pub struct Args {
     /// Recording to replay; the key R makes one.
     #[arg(long, value_name = "FILE")]
     pub replay: Option<PathBuf>,
-    /// Skin of the characters: a .glb file with a skeleton, marathon_man, which comes with Marathon, generated for one made from
-    /// the model, or none for bare shapes [default: marathon_man for Marathon Man, else generated; none in the test bed].
+    /// Skin of the characters: marathon_man, generated (from the shapes of the model), none (bare shapes), or a .glb file with a
+    /// skeleton [default: marathon_man for Marathon Man, generated for others, none in the test bed].
     #[arg(long, value_name = "FILE")]
     pub skin: Option<PathBuf>,
     /// Mapping from bones to bodies, for a skeleton with unknown names [default: the mapping that comes with Marathon for the
@@ -144,8 +144,8 @@ pub struct Args {
     /// Place of the camera [default: behind a character that turns, beside others].
     #[arg(long, value_parser = one_of(CAMERAS))]
     pub camera: Option<CameraMode>,
-    /// Move the camera only as the character and the player move it: no turns of its own, no change of its distance and its
-    /// field of view with the speed.
+    /// Move the camera only as the character and the player move it. It does not turn by itself, and keeps its distance and
+    /// its field of view at every speed.
     #[arg(long)]
     pub reduced_motion: bool,
     /// Limit on the frames per second of the window; 0 for the rate of the screen.

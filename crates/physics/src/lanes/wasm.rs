@@ -179,7 +179,7 @@ pub fn from_bits(bits: u32) -> Mask {
     i32x4_eq(v128_and(i32x4_splat(bits as i32), lane), lane)
 }
 
-/// What the emulation needs.
+/// Operations of the emulation.
 #[cfg(not(target_feature = "relaxed-simd"))]
 mod pairs {
     use super::*;
