@@ -13,7 +13,8 @@ if [ "${#missing[@]}" != 0 ]; then
     echo "tests/lanes/run.sh: install ${missing[*]}" >&2
     exit 1
   fi
-  DEBIAN_FRONTEND=noninteractive apt-get install --quiet=2 --no-install-recommends "${missing[@]}" > /dev/null
+  apt-get update -qq
+  DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}" > /dev/null
 fi
 rustup --quiet target add aarch64-unknown-linux-musl wasm32-wasip1
 CARGO_TARGET_DIR="$(realpath -m "${CARGO_TARGET_DIR:-../../target}")/lanes"

@@ -128,6 +128,8 @@ fn a_skin_is_generated_for_a_model_of_your_own() {
         let dressed = robots.iter().all(|robot| world.get::<Dressed>(*robot).is_some());
         dressed && world.get::<UnfitSkin>(bare).is_some()
     });
+    // a skin takes its first pose in the frame after it is put on
+    app.update();
     let worn = |app: &App, robot| app.world().get::<Skin>(robot).map(|skin| skin.scene.clone());
     // both models are equal, though they were read twice
     assert!(worn(&app, robots[0]).is_some() && worn(&app, robots[0]) == worn(&app, robots[1]));
