@@ -169,7 +169,7 @@ mod tests {
         assert!(blows.is_empty() && factors(&blows) == [1.0; 3]);
         // the hardest blow leaves some strength
         blows.strike((4, 1e3, 1), Some(&r), &limbs, (true, DT));
-        assert_eq!(factors(&blows)[2], r.softest);
+        assert!((factors(&blows)[2] - r.softest).abs() < 1e-9, "{:?}", factors(&blows));
         Ok(())
     }
 
