@@ -6,6 +6,7 @@
 mod batch;
 mod detector;
 mod event;
+mod lane_state;
 mod power;
 mod saved;
 mod sleep;
@@ -13,7 +14,7 @@ mod slot;
 
 pub(crate) use batch::CharacterBatch;
 pub(crate) use event::Event;
-pub(crate) use saved::{KindIdentity, LaneState};
+pub(crate) use lane_state::{KindIdentity, LaneState};
 pub use slot::PoseSample;
 pub(crate) use slot::{Shove, Slot};
 

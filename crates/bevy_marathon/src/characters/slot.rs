@@ -1,8 +1,8 @@
 //! A ragdoll in its lane: its policies, its episode, and the states that frames are drawn from.
 
-use super::LaneState;
 use super::detector::Progress;
 use super::event::Event;
+use super::lane_state::LaneState;
 use crate::limbs::Limbs;
 use crate::lod::Lod;
 use crate::mode::RagdollMode;
