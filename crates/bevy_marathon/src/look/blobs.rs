@@ -3,6 +3,7 @@
 //! A disc has the outline of its body seen from above. The higher the body, the larger and fainter its disc.
 
 use crate::axes::{place_to_game, to_game, to_physics, turn_to_game};
+use crate::look::obstacle::elevation;
 use crate::look::quality::Quality;
 use crate::ragdoll::{Anatomy, OwnGround, Part};
 use bevy::asset::RenderAssetUsages;
@@ -195,19 +196,14 @@ fn height(model: &Model, world: Transform, own: Option<&OwnGround>, point: Vec3)
         let field = model.hfields.get(number)?;
         let place = world * place_to_game(geom.pos, geom.quat);
         let [x, y, _] = to_physics(place.compute_affine().inverse().transform_point3(point));
-        let [half_x, half_y, top, _] = field.size;
+        let [half_x, half_y, ..] = field.size;
         let (across, along) = (field.ncol.max(2) - 1, field.nrow.max(2) - 1);
         let [u, v] = [(x / half_x + 1.0) * 0.5 * across as f64, (y / half_y + 1.0) * 0.5 * along as f64];
         if !(0.0..=across as f64).contains(&u) || !(0.0..=along as f64).contains(&v) {
             return None;
         }
-        let own = own.and_then(|own| own.0.get(number));
-        let at = |row: usize, column: usize| {
-            let i = row.min(field.nrow - 1) * field.ncol + column.min(field.ncol - 1);
-            own.and_then(|own| own.get(i))
-                .copied()
-                .unwrap_or_else(|| top as f32 * field.data.get(i).copied().unwrap_or(0.0))
-        };
+        let own = own.and_then(|own| own.0.get(number)).map(Vec::as_slice);
+        let at = |row: usize, column: usize| elevation(field, own, row.min(field.nrow - 1), column.min(field.ncol - 1));
         let (row, column) = (v as usize, u as usize);
         let (p, q) = ((v.fract()) as f32, (u.fract()) as f32);
         let low = at(row, column) * (1.0 - q) + at(row, column + 1) * q;

@@ -6,7 +6,7 @@
 use crate::look::blobs::soft_disc;
 use crate::look::quality::Quality;
 use crate::messages::FootContact;
-use crate::ragdoll::{Anatomy, Episode};
+use crate::ragdoll::Episode;
 use bevy::light::{NotShadowCaster, NotShadowReceiver};
 use bevy::prelude::*;
 
@@ -84,8 +84,7 @@ fn raise(
     mut puffs: ResMut<Puffs>,
     quality: Option<Res<Quality>>,
     mut contacts: MessageReader<FootContact>,
-    ragdolls: Query<(&Anatomy, &Episode)>,
-    parts: Query<&GlobalTransform>,
+    ragdolls: Query<&Episode>,
     mut old: Query<(&mut Puff, &mut Transform)>,
 ) {
     if quality.is_none_or(|quality| *quality == Quality::Low) {
@@ -93,22 +92,17 @@ fn raise(
         return;
     }
     for contact in contacts.read().filter(|contact| contact.down) {
-        let Ok((anatomy, episode)) = ragdolls.get(contact.ragdoll) else { continue };
+        let Ok(episode) = ragdolls.get(contact.ragdoll) else { continue };
         if episode.speed.abs() < SLOWEST || episode.down {
             continue;
         }
-        let name = anatomy.feet.get(contact.foot);
-        let foot = name.and_then(|name| anatomy.model.geoms.iter().find(|geom| geom.name.as_str() == &**name));
-        let place = foot.and_then(|geom| Some((geom, parts.get(*anatomy.parts.get(geom.body)?).ok()?)));
-        let Some((geom, part)) = place else { continue };
-        let at = part.transform_point(crate::axes::to_game(geom.pos)) - Vec3::Y * geom.size[0] as f32;
         for i in 0..PER_STEP {
             let number = puffs.next;
             puffs.next = (number + 1) % MOST;
             // around the foot in even steps, which the order of the puffs turns
             let (sin, cos) = (number as f32 * 2.4 + i as f32).sin_cos();
             let puff = Puff { number, velocity: Vec3::new(0.35 * cos, 0.30, 0.35 * sin), age: 0.0 };
-            let place = Transform::from_translation(at + 0.04 * Vec3::Y).with_scale(Vec3::splat(RADIUS[0]));
+            let place = Transform::from_translation(contact.point + 0.04 * Vec3::Y).with_scale(Vec3::splat(RADIUS[0]));
             if let Some((mut old, mut transform)) = old.iter_mut().find(|(old, _)| old.number == number) {
                 (*old, *transform) = (puff, place);
                 continue;

@@ -186,10 +186,15 @@ impl Field<'_> {
     }
 
     fn height(&self, row: usize, column: usize) -> f32 {
-        let i = row * self.of.ncol + column;
-        let own = self.own.and_then(|own| own.get(i)).copied();
-        own.unwrap_or_else(|| self.of.size[2] as f32 * self.of.data.get(i).copied().unwrap_or_default())
+        elevation(self.of, self.own, row, column)
     }
+}
+
+/// Elevation of a point of a field, m: its own, or else that of the model.
+pub(crate) fn elevation(field: &HField, own: Option<&[f32]>, row: usize, column: usize) -> f32 {
+    let i = row * field.ncol + column;
+    let own = own.and_then(|own| own.get(i)).copied();
+    own.unwrap_or_else(|| field.size[2] as f32 * field.data.get(i).copied().unwrap_or_default())
 }
 
 /// The points of a side of a field whose cells reach within `around` of a place. None beside the field.

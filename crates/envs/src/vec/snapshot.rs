@@ -32,19 +32,21 @@ impl VecEnv {
     /// the number of threads. It includes the agents' own inputs ([`VecEnv::context`]), but not the task's arguments
     /// and the episode limit.
     pub fn save(&self) -> Vec<u8> {
-        let mut bytes = [&MARK[..], &[0; 4]].concat();
-        bytes.extend((self.agents as u64).to_le_bytes());
-        bytes.extend((self.spec.id.len() as u64).to_le_bytes());
-        bytes.extend(self.spec.id.as_bytes());
+        let mut bytes = (self.agents as u64).to_le_bytes().to_vec();
+        self.add_name(&mut bytes);
         for worker in &self.workers {
             for block in 0..worker.shard.blocks() {
                 worker.shard.save(block, &mut bytes);
                 bytes.extend(worker.pending[block].to_le_bytes());
             }
         }
-        let (head, body) = bytes.split_at_mut(12);
-        head[8..].copy_from_slice(&crc32fast::hash(body).to_le_bytes());
-        bytes
+        seal(MARK, &bytes)
+    }
+
+    /// Appends the name of the task, after its length.
+    fn add_name(&self, bytes: &mut Vec<u8>) {
+        bytes.extend((self.spec.id.len() as u64).to_le_bytes());
+        bytes.extend(self.spec.id.as_bytes());
     }
 
     /// Restores a state of [`VecEnv::save`]. It does not include which roles [act](VecEnv::decides) next.
@@ -74,15 +76,12 @@ impl VecEnv {
         self.check_agent(agent)?;
         let (worker, local) = (&self.workers[agent / self.stride], agent % self.stride);
         let (block, lane) = (local / BLOCK, local % BLOCK);
-        let mut bytes = [&AGENT_MARK[..], &[0; 4]].concat();
-        bytes.extend((self.spec.id.len() as u64).to_le_bytes());
-        bytes.extend(self.spec.id.as_bytes());
+        let mut bytes = Vec::new();
+        self.add_name(&mut bytes);
         bytes.push((worker.pending[block] >> lane & 1) as u8);
         bytes.extend(worker.deciders.save(block, lane));
         worker.shard.save_agent(local, &mut bytes);
-        let (head, body) = bytes.split_at_mut(12);
-        head[8..].copy_from_slice(&crc32fast::hash(body).to_le_bytes());
-        Ok(bytes)
+        Ok(seal(AGENT_MARK, &bytes))
     }
 
     /// Restores a state of [`VecEnv::save_agent`] in any agent of the same task. The bits of the other agents do not
@@ -130,6 +129,11 @@ impl VecEnv {
         }
         if bytes.is_empty() { Ok(()) } else { refuse(format!("it has {} bytes after its end", bytes.len())) }
     }
+}
+
+/// A snapshot of a body: its mark, its checksum and the body.
+fn seal(mark: &[u8; 8], body: &[u8]) -> Vec<u8> {
+    [&mark[..], &crc32fast::hash(body).to_le_bytes(), body].concat()
 }
 
 /// The body of a snapshot of `what`, after checking its mark and its checksum.

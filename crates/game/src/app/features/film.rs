@@ -46,8 +46,7 @@ impl FilmReel {
     /// The recording of the last seconds, if there is one.
     pub fn last_seconds(&self) -> Option<Recording> {
         let mut recording = self.tape.as_ref()?.recording.clone();
-        let most = (SECONDS / recording.dt).round() as usize + 1;
-        recording.drop_front(recording.frames().saturating_sub(most));
+        recording.drop_front(recording.frames().saturating_sub(most_frames(&recording)));
         (recording.frames() > 1).then_some(recording)
     }
 
@@ -71,6 +70,11 @@ pub(super) fn plugin(app: &mut App) {
         .add_systems(FixedUpdate, remember.after(MarathonSystems::Report));
 }
 
+/// Frames of a film.
+fn most_frames(recording: &Recording) -> usize {
+    (SECONDS / recording.dt).round() as usize + 1
+}
+
 /// Forgets the characters before.
 fn rewind(mut reel: ResMut<FilmReel>) {
     reel.tape = None;
@@ -89,13 +93,11 @@ fn remember(
     let mut all: Vec<_> = actors.iter().collect();
     all.sort_by_key(|(actor, ..)| actor.0);
     let Some((.., anatomy, _)) = all.first() else { return };
-    let tape = reel.tape.get_or_insert_with(|| {
-        let places = all.iter().flat_map(|(.., track)| track.translation.to_array()).collect();
-        Tape::new(Recording::new(loaded.task_config.clone(), loaded.ground, anatomy.dt, places))
-    });
+    let tracks = all.iter().map(|(.., track)| *track);
+    let tape = reel.tape.get_or_insert_with(|| Tape::new(&loaded, anatomy.dt, tracks));
     let rows: Vec<_> = all.iter().map(|(_, state, episode, anatomy, _)| (*state, *episode, *anatomy)).collect();
     tape.append(&marathon, &rows);
-    let (frames, most) = (tape.recording.frames(), (SECONDS / tape.recording.dt).round() as usize + 1);
+    let (frames, most) = (tape.recording.frames(), most_frames(&tape.recording));
     // twice as many are kept, so that moving them costs little
     if frames > 2 * most {
         tape.recording.drop_front(frames - most);

@@ -89,9 +89,8 @@ fn control(
     all.sort_by_key(|(actor, ..)| actor.0);
     let Some((_, anatomy, _)) = all.first() else { return };
     *requested = false;
-    let places = all.iter().flat_map(|(.., t)| t.translation.to_array()).collect();
-    let recording = Recording::new(loaded.task_config.clone(), loaded.ground, anatomy.dt, places);
-    commands.insert_resource(Recorder(Tape::new(recording)));
+    let tracks = all.iter().map(|(.., track)| *track);
+    commands.insert_resource(Recorder(Tape::new(&loaded, anatomy.dt, tracks)));
     notes.say("recording; the same key ends it");
 }
 

@@ -1,6 +1,8 @@
 //! The decisions of running characters, as a recording that grows.
 
 use super::Recording;
+use crate::app::stage::loaded::LoadedPolicy;
+use bevy::prelude::*;
 use bevy_marathon::{Anatomy, Episode, Marathon, RagdollState};
 use std::time::Duration;
 
@@ -13,8 +15,10 @@ pub struct Tape {
 }
 
 impl Tape {
-    /// An empty recording grows from here on.
-    pub fn new(recording: Recording) -> Self {
+    /// Begins with no decision of characters whose tracks begin at these places. `dt` is the time between two decisions, s.
+    pub fn new<'a>(loaded: &LoadedPolicy, dt: f64, tracks: impl Iterator<Item = &'a Transform>) -> Self {
+        let places = tracks.flat_map(|track| track.translation.to_array()).collect();
+        let recording = Recording::new(loaded.task_config.clone(), loaded.ground, dt, places);
         Tape { recording, until: Duration::ZERO }
     }
 
