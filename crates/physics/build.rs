@@ -3,6 +3,8 @@
 //! of the compile time.
 //!
 //! Sets `cfg(vectors = "...")`: the 128-bit vectors that every processor of the target has.
+//!
+//! Sets `cfg(one_lane_type)` for web pages: four lanes are the only ones. Each further type doubles what a visitor downloads.
 
 use std::env::var;
 
@@ -10,7 +12,13 @@ fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rustc-check-cfg=cfg(without_fma)");
     println!("cargo::rustc-check-cfg=cfg(vectors, values(\"sse2\", \"neon\", \"simd128\", \"relaxed\", \"none\"))");
+    println!("cargo::rustc-check-cfg=cfg(one_lane_type)");
     println!("cargo::rustc-cfg=vectors=\"{}\"", vectors());
+    let page = var("CARGO_CFG_TARGET_ARCH").is_ok_and(|arch| arch == "wasm32")
+        && var("CARGO_CFG_TARGET_OS").is_ok_and(|os| os == "unknown");
+    if page && vectors() != "none" {
+        println!("cargo::rustc-cfg=one_lane_type");
+    }
     let x86 = var("CARGO_CFG_TARGET_ARCH").is_ok_and(|arch| arch == "x86_64");
     let for_this_processor = var("TARGET").ok() == var("HOST").ok() && !has_fma();
     if !x86 || var("CARGO_FEATURE_BASELINE").is_ok() || for_this_processor {

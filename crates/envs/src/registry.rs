@@ -61,7 +61,7 @@ impl Registry {
             return Err(EnvError::DuplicateAgent { suggestion: free.unwrap_or_default(), id });
         }
         // reject an agent that contradicts its model now, not at its first use
-        agent.clone().shards(Isa::F32)?;
+        agent.clone().shards(Isa::best())?;
         self.agents.push((id, agent));
         Ok(())
     }

@@ -11,9 +11,12 @@ use marathon_physics::lanes::Real;
 use crate::agent::{Obs, Senses};
 use crate::any_agent::AnyAgent;
 
-/// All agents, in the order of listings.
+/// All agents, in the order of listings. Without the feature `suite`, those of [`marathon::core`].
 pub fn all() -> Vec<Arc<dyn AnyAgent>> {
-    [marathon::all(), gymnasium::all(), dm_control::all()].concat()
+    #[cfg(feature = "suite")]
+    return [marathon::all(), gymnasium::all(), dm_control::all()].concat();
+    #[cfg(not(feature = "suite"))]
+    marathon::core()
 }
 
 /// Extra names of tasks, `(alias, id)`. Each id without its version is a name already.

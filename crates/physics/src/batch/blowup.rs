@@ -49,7 +49,8 @@ impl Blowup {
     pub fn replay(&self, model: &Model, options: &BatchOptions) -> Result<Vec<Replay>, SimError> {
         let single = match self.isa.parse() {
             Ok(Isa::F64) => Isa::F64,
-            _ => Isa::F32,
+            _ if Isa::F32.supported() => Isa::F32,
+            _ => Isa::best(),
         };
         let options = BatchOptions { agents: 1, threads: 1, isa: single, guard: 0, sim: options.sim.clone() };
         let mut batch = Batch::new(model, &options)?;

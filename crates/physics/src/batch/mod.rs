@@ -74,7 +74,8 @@ impl Batch {
         assert!(options.isa.supported(), "cannot run {}: {}", options.isa.name(), options.isa.obstacle().unwrap_or(""));
         let (agents, threads) = (options.agents.max(1), options.threads.max(1));
         // one lane gives the same bits without computing unused lanes
-        let isa = if agents == 1 && options.isa != Isa::F64 { Isa::F32 } else { options.isa };
+        let alone = agents == 1 && options.isa != Isa::F64 && Isa::F32.supported();
+        let isa = if alone { Isa::F32 } else { options.isa };
         let inner = with_lanes!(isa, T => {
             let sim = Sim::<T>::new(model, options.sim.clone())?;
             Box::new(LaneBatch::new(sim, agents, threads)) as Box<dyn Lanes>

@@ -293,6 +293,7 @@ impl Isa {
     /// Whether this processor can run it, and this program has the kernels for it.
     pub fn supported(self) -> bool {
         match self {
+            isa if cfg!(one_lane_type) => isa == Isa::X4,
             Isa::F64 => f64::supported(),
             Isa::F32 => f32::supported(),
             Isa::X4 => cfg!(without_fma),
@@ -308,6 +309,7 @@ impl Isa {
     pub fn obstacle(self) -> Option<&'static str> {
         match self {
             isa if isa.supported() => None,
+            _ if cfg!(one_lane_type) => Some("programs for web pages have four lanes only"),
             Isa::X4 => Some("this program was built without the feature `baseline`"),
             Isa::F64 | Isa::F32 => Some(NEEDS_FMA),
             _ => Some("this processor does not support it"),
@@ -354,6 +356,7 @@ macro_rules! with_baseline {
 }
 
 /// Runs `$body` with the type alias `$T` bound to the lane type of an [`Isa`].
+#[cfg(not(one_lane_type))]
 #[macro_export]
 macro_rules! with_lanes {
     ($isa:expr, $T:ident => $body:expr) => {
@@ -371,6 +374,7 @@ macro_rules! with_lanes {
 ///
 /// # Panics
 /// With [`Isa::F64`].
+#[cfg(not(one_lane_type))]
 #[macro_export]
 macro_rules! with_single_lanes {
     ($isa:expr, $T:ident => $body:expr) => {
@@ -396,6 +400,36 @@ macro_rules! with_single_lanes {
             }
             #[cfg(not(target_arch = "x86_64"))]
             _ => unreachable!("not supported on this processor"),
+        }
+    };
+}
+
+/// Runs `$body` with the type alias `$T` bound to the lane type of an [`Isa`]. Programs for web pages have one.
+///
+/// # Panics
+/// With an instruction set that is not [supported](lanes::Isa::supported).
+#[cfg(one_lane_type)]
+#[macro_export]
+macro_rules! with_lanes {
+    ($isa:expr, $T:ident => $body:expr) => {
+        $crate::with_single_lanes!($isa, $T => $body)
+    };
+}
+
+/// The same.
+///
+/// # Panics
+/// As [`with_lanes`].
+#[cfg(one_lane_type)]
+#[macro_export]
+macro_rules! with_single_lanes {
+    ($isa:expr, $T:ident => $body:expr) => {
+        match $isa {
+            $crate::lanes::Isa::X4 => {
+                type $T = $crate::lanes::F32x4;
+                $body
+            }
+            isa => unreachable!("{} in a program that has four lanes only", isa.name()),
         }
     };
 }

@@ -100,6 +100,8 @@ impl<T: Real> Sim<T> {
     ///
     /// # Errors
     /// If the model uses something this engine does not simulate.
+    // not inlined, and so compiled once for all crates
+    #[inline(never)]
     pub fn new(model: &Model, options: SimOptions) -> Result<Sim<T>, SimError> {
         unsupported::check(model)?;
         let c = T::scalar;

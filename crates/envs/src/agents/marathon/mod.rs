@@ -44,6 +44,22 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
     out
 }
 
+/// The agents that web pages have: those of the paper with their controllers and the assault course, and Marathon Man.
+pub fn core() -> Vec<Arc<dyn AnyAgent>> {
+    let mut out: Vec<Arc<dyn AnyAgent>> = vec![
+        Arc::new(hopper::HopperV0),
+        Arc::new(walker2d::Walker2dV0),
+        Arc::new(humanoid::HumanoidV0),
+        Arc::new(ant::AntV0),
+        Arc::new(controller::HopperController::default()),
+        Arc::new(controller::WalkerController::default()),
+        Arc::new(controller::AntController),
+        Arc::new(terrain::TerrainWalker2d::default()),
+    ];
+    out.extend(marathon_man::core());
+    out
+}
+
 /// Extra names of tasks, `(alias, id)`. Each id without its version is a name already.
 pub const ALIASES: [(&str, &str); 3] =
     [("walker", "Walker2d-v0"), ("walker-v0", "Walker2d-v0"), ("walker-v1", "Walker2d-v1")];

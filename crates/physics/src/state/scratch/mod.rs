@@ -45,6 +45,8 @@ pub struct Work<T: Real> {
 
 impl<T: Real> Work<T> {
     /// Scratch memory for a model.
+    // not inlined, and so compiled once for all crates
+    #[inline(never)]
     pub fn new(sim: &Sim<T>) -> Self {
         Work {
             motion: Motion::new(sim),

@@ -136,6 +136,13 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
     tasks.map(agent).chain(told).collect()
 }
 
+/// Imitation of any clip, and the controller.
+pub fn core() -> Vec<Arc<dyn AnyAgent>> {
+    let summary = "a figure of 21 motors: move as a motion clip does";
+    let any = MarathonMan { id: "MarathonMan-v0", summary, any_clip: true, arguments: Arguments::default() };
+    vec![Arc::new(any), Arc::new(controller::Controller::default())]
+}
+
 /// Checks that a model has the character's joints.
 fn has_joints(model: &Model) -> Result<(), String> {
     let expected = JOINTS.each_ref().map(|joint| joint.name);

@@ -1,0 +1,72 @@
+import { type Bridge, Handle, joinState, splitState } from "./bridge.js";
+import type { Vector } from "./env.js";
+import { ARRAY, MATRIX } from "./exports.js";
+import type { ModelInfo, State } from "./types.js";
+
+/** A model by itself, without a task. */
+export class Simulation extends Handle {
+  readonly model: ModelInfo;
+
+  /** @internal Use `Marathon.simulation`. */
+  static create(bridge: Bridge, xml: string, files: Readonly<Record<string, Uint8Array>>, name?: string): Simulation {
+    const object = bridge.call((exports) => exports.simulation_new(), { xml, name: name ?? null }, files);
+    return new Simulation(bridge, object);
+  }
+
+  private constructor(bridge: Bridge, object: number) {
+    super(bridge, object);
+    this.model = bridge.json<ModelInfo>();
+  }
+
+  /** The controls, `[actuator]`. Write to it before a step. The view is valid until the next call. */
+  get ctrl(): Float64Array {
+    return this.bridge.doubles(this.#place(ARRAY.actions), this.model.actuators.length);
+  }
+
+  /** Back to the first keyframe; without keyframes, to the reference configuration. */
+  reset(): void {
+    this.bridge.call((exports) => exports.simulation_reset(this.object));
+  }
+
+  /** Advances by physics steps. Returns false if the state became infinite; the model is then back at its start. */
+  step(steps = 1): boolean {
+    this.bridge.call((exports) => exports.simulation_step(this.object, steps));
+    return this.bridge.bytes().length === 0;
+  }
+
+  /** Pushes a body until changed: force, N, and torque, N m, in world axes at its center of mass. */
+  push(body: number, force: Vector, torque: Vector = [0, 0, 0]): void {
+    this.bridge.call((exports) => exports.simulation_push(this.object, body, ...force, ...torque));
+  }
+
+  /** Matrices of the geoms, `[geom][16]`: four columns, m, z up. The view is valid until the next call. */
+  poses(): Float32Array {
+    return this.bridge.floats(this.#place(ARRAY.geoms), this.model.geoms.length * MATRIX);
+  }
+
+  /** Matrices of the bodies, `[body][16]`. The view is valid until the next call. */
+  bodyPoses(): Float32Array {
+    return this.bridge.floats(this.#place(ARRAY.bodies), this.model.bodies.length * MATRIX);
+  }
+
+  /** The state. */
+  state(): State {
+    this.bridge.call((exports) => exports.simulation_state(this.object));
+    return splitState(this.bridge.bytes(), this.model.nq);
+  }
+
+  /** Sets the state. */
+  setState(qpos: ArrayLike<number>, qvel: ArrayLike<number>): void {
+    this.bridge.call((exports) => exports.simulation_set_state(this.object), {}, { state: joinState(qpos, qvel) });
+  }
+
+  /** 16 hexadecimal digits over the bits of the state. They are the same in all browsers and in the native program. */
+  hash(): string {
+    this.bridge.call((exports) => exports.simulation_hash(this.object));
+    return this.bridge.text();
+  }
+
+  #place(which: number): number {
+    return this.bridge.place((exports) => exports.simulation_array(this.object, which));
+  }
+}

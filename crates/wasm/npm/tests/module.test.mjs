@@ -1,0 +1,127 @@
+import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
+import { test } from "node:test";
+import { MarathonError, load } from "../dist/index.js";
+
+const root = new URL("../../../../", import.meta.url);
+const bits = JSON.parse(await readFile(new URL("../../tests/bits.json", import.meta.url), "utf8"));
+const policy = async (name) => new Uint8Array(await readFile(new URL(`assets/policies/${name}.safetensors`, root)));
+// the tests run once per module
+const marathon = await load({ lanes: process.env.MARATHON_LANES ?? "exact" });
+
+/** FNV-1a, as in tests/bits.rs. */
+function fnv(bytes) {
+  let hash = 0xcbf29ce484222325n;
+  for (const byte of bytes) hash = BigInt.asUintN(64, (hash ^ BigInt(byte)) * 0x100000001b3n);
+  return hash.toString(16).padStart(16, "0");
+}
+
+for (const [task, expected] of Object.entries(bits.states)) {
+  test(`the states of ${task} have the bits of the native program`, () => {
+    const env = marathon.env(task, { agents: 16, seed: 1 });
+    const actions = new Float32Array(16 * env.spec.act);
+    for (let step = 0; step < 1000; step++) {
+      for (let i = 0; i < actions.length; i++) actions[i] = ((step * 7 + i * 13) % 17) / 8 - 1;
+      env.step(actions);
+    }
+    assert.equal(env.hash(), expected);
+    env.free();
+  });
+}
+
+for (const [file, expected] of Object.entries(bits.models)) {
+  test(`the states of ${file} have the bits of the native program`, async () => {
+    const simulation = marathon.simulation(await readFile(new URL(`assets/${file}`, root), "utf8"));
+    for (let step = 0; step < 1000; step++) {
+      const { ctrl } = simulation;
+      for (let i = 0; i < ctrl.length; i++) ctrl[i] = ((step * 7 + i * 13) % 17) / 8 - 1;
+      simulation.step();
+    }
+    assert.equal(simulation.hash(), expected);
+    simulation.free();
+  });
+}
+
+test("a short training has the weights of the native program", () => {
+  const { task, config, policy: expected } = bits.training;
+  const trainer = marathon.trainer(task, config);
+  let steps = 0;
+  while (!trainer.done) steps = trainer.iterate().steps;
+  assert.ok(steps >= config.run.total_steps);
+  assert.equal(fnv(trainer.policy()), expected);
+  assert.throws(() => trainer.iterate(), /has made its 200000 steps/);
+  trainer.free();
+});
+
+test("a policy obeys commands", async () => {
+  const env = marathon.env("MarathonManController", { policy: await policy("MarathonManController"), seed: 3 });
+  const speed = env.spec.command.find((range) => range.unit === "m/s");
+  const x = () => env.state(0).qpos[0];
+  env.command(0, {});
+  for (let i = 0; i < 60; i++) env.step();
+  assert.ok(Math.abs(x()) < 0.5, `it stands, at ${x()}`);
+  env.command(0, { [speed.name]: 2 });
+  for (let i = 0; i < 120; i++) env.step();
+  assert.ok(x() > 2, `it walks, to ${x()}`);
+  assert.throws(() => env.command(0, { sped: 1 }), /no command 'sped', expected one of/);
+});
+
+test("a snapshot restores the future", async () => {
+  const env = marathon.env("Hopper-v0", { policy: await policy("hopper"), agents: 3, seed: 5 });
+  for (let i = 0; i < 30; i++) env.step();
+  const snapshot = env.snapshot();
+  for (let i = 0; i < 50; i++) env.step();
+  const hash = env.hash();
+  env.restore(snapshot);
+  for (let i = 0; i < 50; i++) env.step();
+  assert.equal(env.hash(), hash);
+  env.push(1, 1, [200, 0, 0]);
+  for (let i = 0; i < 5; i++) env.step();
+  assert.notEqual(env.hash(), hash);
+});
+
+test("a model is simulated, and its poses follow", () => {
+  const xml = `<mujoco><worldbody><geom type="plane" size="5 5 1"/><body name="ball" pos="0 0 2"><freejoint/>
+    <geom type="sphere" size="0.1" rgba="1 0 0 1"/></body></worldbody></mujoco>`;
+  const simulation = marathon.simulation(xml);
+  assert.deepEqual(simulation.model.geoms.map((geom) => geom.kind), ["plane", "sphere"]);
+  const start = simulation.poses()[16 + 14];
+  assert.equal(start, 2);
+  assert.ok(simulation.step(100));
+  assert.ok(simulation.poses()[16 + 14] < 1.9);
+  simulation.reset();
+  simulation.push(1, [0, 0, 1000]);
+  simulation.step(10);
+  assert.ok(simulation.state().qpos[2] > 2);
+});
+
+test("errors name the place, and missing files", () => {
+  const refused = (xml) => {
+    try {
+      marathon.simulation(xml, {}, "robot.xml");
+    } catch (error) {
+      assert.ok(error instanceof MarathonError);
+      return error;
+    }
+    return assert.fail("accepted");
+  };
+  assert.match(refused("<mujoco").message, /robot\.xml/);
+  assert.match(refused(`<mujoco><worldbody><body pos="0 NaN 0"/></worldbody></mujoco>`).message, /NaN/);
+  assert.deepEqual(refused(`<mujoco><include file="arm.xml"/></mujoco>`).missing, ["arm.xml"]);
+  assert.throws(() => marathon.env("Hoper-v0"), /Hopper-v0/);
+  assert.throws(() => marathon.env("Hopper-v0", { agents: 0 }), /agents/);
+  assert.throws(() => marathon.trainer("Hopper-v0", { ppo: { lrr: 1 } }), /lr/);
+  const noise = Uint8Array.from({ length: 100_000 }, (_, i) => (i * 7919) % 251);
+  assert.throws(() => marathon.policyInfo(noise), MarathonError);
+  assert.throws(() => marathon.importMotion("MarathonMan", "walk.bvh", noise), MarathonError);
+  assert.equal(marathon.env("Hopper-v0").spec.id, "Hopper-v0", "the module still works");
+});
+
+test("freed objects are refused, and memory does not grow", () => {
+  const env = marathon.env("Hopper-v0");
+  env.free();
+  assert.throws(() => env.step(), /has been freed/);
+  const before = marathon.memoryBytes;
+  for (let i = 0; i < 200; i++) marathon.env("Hopper-v0", { agents: 16 }).free();
+  assert.ok(marathon.memoryBytes - before < 2e6, `${marathon.memoryBytes - before} bytes`);
+});
