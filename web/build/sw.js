@@ -1,0 +1,58 @@
+// Service worker: the page works without a network after the first visit. Each build has its own cache.
+const CACHE = "marathon-__BUILD__";
+const FILES = ["__FILES__"];
+
+self.addEventListener("install", (event) => {
+  const fill = async () => {
+    const cache = await caches.open(CACHE);
+    // one missing file, such as one that a host leaves out, must not prevent the rest
+    await Promise.allSettled(FILES.map((file) => cache.add(new Request(file, { cache: "no-cache" }))));
+    await self.skipWaiting();
+  };
+  event.waitUntil(fill());
+});
+
+self.addEventListener("activate", (event) => {
+  const clean = async () => {
+    const old = (await caches.keys()).filter((name) => name.startsWith("marathon-") && name !== CACHE);
+    await Promise.all(old.map((name) => caches.delete(name)));
+    await self.clients.claim();
+  };
+  event.waitUntil(clean());
+});
+
+// the page names the files that it loaded before this worker controlled it
+self.addEventListener("message", (event) => {
+  const add = async () => {
+    const cache = await caches.open(CACHE);
+    for (const url of event.data.loaded ?? []) {
+      if (url.startsWith(self.registration.scope) && !(await cache.match(url))) await cache.add(url).catch(() => {});
+    }
+  };
+  event.waitUntil(add());
+});
+
+self.addEventListener("fetch", (event) => {
+  const { request } = event;
+  if (request.method !== "GET" || !request.url.startsWith(self.registration.scope)) return;
+  const page = request.mode === "navigate";
+  const answer = async () => {
+    const cache = await caches.open(CACHE);
+    const key = page ? "index.html" : request;
+    // a page comes from the network if there is one, so that a new build is seen at once
+    if (!page) {
+      const known = await cache.match(key, { ignoreSearch: true });
+      if (known) return known;
+    }
+    try {
+      const response = await fetch(request);
+      if (response.ok && response.type === "basic") await cache.put(key, response.clone());
+      return response;
+    } catch (error) {
+      const known = await cache.match(key, { ignoreSearch: true });
+      if (known) return known;
+      throw error;
+    }
+  };
+  event.respondWith(answer());
+});

@@ -1,0 +1,265 @@
+/** The page around the views: header, picture, panel, messages, drops and links. */
+import { reducedMotion, ThemeSwitch } from "./theme";
+import { button, download, el } from "./dom";
+import { engine, restartEngine } from "./engine";
+import { type GivenFile, droppedFiles, extension } from "./files";
+import { Messages, reason } from "./messages";
+import { type Route, VIEWS, type ViewName, isEmbedded, linkOf, parseRoute } from "./route";
+import type { MakeView, View } from "./view";
+import { Stage } from "../scene/stage";
+import { makePlay } from "../play/view";
+
+const NAMES: Record<ViewName, string> = { play: "Play", learn: "Learn", models: "Models", motion: "Motion", policies: "Policies" };
+
+/** Views load when they are opened; the first one comes with the page. */
+const LOADERS: Record<ViewName, () => Promise<MakeView>> = {
+  play: async () => makePlay,
+  learn: async () => (await import("../learn/view")).makeLearn,
+  models: async () => (await import("../models/view")).makeModels,
+  motion: async () => (await import("../motion/view")).makeMotion,
+  policies: async () => (await import("../policies/view")).makePolicies,
+};
+
+const KINDS: Readonly<Record<string, ViewName>> = {
+  xml: "models",
+  mjcf: "models",
+  bvh: "motion",
+  glb: "motion",
+  gltf: "motion",
+  vrm: "motion",
+  motion: "motion",
+  safetensors: "policies",
+  onnx: "policies",
+};
+
+/** For tests, and for pages of the same origin that embed this one. */
+export interface PageHandle {
+  view: View | null;
+  name: ViewName | null;
+  stage: Stage;
+  engine: typeof engine;
+}
+
+declare global {
+  interface Window {
+    marathonPage?: PageHandle;
+  }
+}
+
+class Shell {
+  readonly #messages = new Messages();
+  readonly #theme = new ThemeSwitch();
+  readonly #canvas = el("canvas", { tabindex: 0, role: "application", "aria-label": "Picture of the simulation" });
+  readonly #overlay = el("div", { class: "overlay" });
+  readonly #panel = el("div", { class: "panel-body", id: "panel" });
+  readonly #links = new Map<ViewName, HTMLAnchorElement>();
+  readonly #stage: Stage;
+  readonly #handle: PageHandle;
+  #route: Route = parseRoute(new URL(location.href));
+  /** Number of the view that is being opened. */
+  #turn = 0;
+
+  constructor(root: HTMLElement) {
+    const embedded = isEmbedded(new URL(location.href));
+    document.documentElement.classList.toggle("embedded", embedded);
+    const stageBox = el("div", { class: "stage" }, this.#canvas);
+    const panel = el("section", { class: "panel", "aria-label": "Controls" }, this.#panelToggle(), this.#panel);
+    const main = el("main", { id: "main" }, stageBox, this.#overlay, panel);
+    root.replaceChildren(embedded ? this.#corner() : this.#header(), main, this.#messages.element);
+    if (innerWidth < 700 || embedded) panel.classList.add("folded");
+    this.#stage = new Stage(this.#canvas, reducedMotion());
+    this.#theme.onChange((theme) => this.#stage.setTheme(theme));
+    this.#handle = { view: null, name: null, stage: this.#stage, engine };
+    window.marathonPage = this.#handle;
+    // a click leaves the focus on a button, where Space would press it again
+    root.addEventListener("click", ({ target, detail }) => {
+      if (detail > 0 && target instanceof HTMLElement && target.closest("button")) this.#canvas.focus({ preventScroll: true });
+    });
+    this.#listenForDrops();
+    addEventListener("hashchange", () => {
+      const next = parseRoute(new URL(location.href));
+      if (linkOf(next) !== linkOf(this.#route)) void this.#open(next, []);
+    });
+    void this.#open(this.#route, []);
+  }
+
+  #header(): HTMLElement {
+    const nav = el("nav", { "aria-label": "Views" });
+    for (const view of VIEWS) {
+      const link = el("a", { href: `#/${view}` }, NAMES[view]);
+      this.#links.set(view, link);
+      nav.append(link);
+    }
+    const logo = el("img", { src: "favicon.svg", alt: "", width: 26, height: 26 });
+    const tools = el(
+      "div",
+      { class: "tools" },
+      button("Link", () => void this.#copyLink(), { title: "Copy the link of this view", "aria-label": "Copy the link of this view" }),
+      button("Picture", () => void this.#picture(), { title: "Save a picture", "aria-label": "Save a picture" }),
+      button("◐", () => this.#theme.flip(), { class: "icon", title: "Dark or light", "aria-label": "Switch between dark and light" }),
+    );
+    return el("header", {}, el("a", { href: "#/play", class: "logo" }, logo, el("h1", {}, "Marathon")), nav, tools);
+  }
+
+  /** In another page, only a link to the full one. */
+  #corner(): HTMLElement {
+    const link = el("a", { class: "corner", target: "_blank", rel: "noopener", href: "./" }, "Marathon");
+    // the link follows the view
+    link.addEventListener("pointerdown", () => (link.href = `./${linkOf(this.#route)}`));
+    return el("header", { class: "slim" }, el("h1", { class: "visually-hidden" }, "Marathon"), link);
+  }
+
+  #panelToggle(): HTMLElement {
+    const fold = button("Controls", () => {
+      const folded = fold.parentElement?.classList.toggle("folded") ?? false;
+      fold.setAttribute("aria-expanded", String(!folded));
+    }, { class: "fold", "aria-controls": "panel", "aria-expanded": String(innerWidth >= 700) });
+    return fold;
+  }
+
+  async #open(route: Route, files: readonly GivenFile[]): Promise<void> {
+    const turn = ++this.#turn;
+    const gone = (): boolean => turn !== this.#turn;
+    this.#route = route;
+    this.#close();
+    for (const [view, link] of this.#links) {
+      if (view === route.view) link.setAttribute("aria-current", "page");
+      else link.removeAttribute("aria-current");
+    }
+    document.title = `${NAMES[route.view]} · Marathon`;
+    this.#overlay.append(el("p", { class: "loading", role: "status" }, "Loading"));
+    try {
+      const [marathon, make] = await Promise.all([engine(), LOADERS[route.view]()]);
+      if (gone()) return;
+      this.#overlay.replaceChildren();
+      const view = await make({
+        stage: this.#stage,
+        marathon,
+        panel: this.#panel,
+        overlay: this.#overlay,
+        params: route.params,
+        files,
+        stay: () => {
+          if (gone()) throw new Error("this view has been left");
+        },
+        say: (text, kind) => this.#messages.say(text, kind),
+        fail: (error) => this.#fail(error),
+        link: (settings) => this.#link(settings),
+        open: (name, params, given = []) => this.#go({ view: name, params: new URLSearchParams(params) }, given),
+        openFiles: (given) => this.#openFiles(given),
+      });
+      if (gone()) {
+        view.dispose();
+        return;
+      }
+      this.#handle.view = view;
+      this.#handle.name = route.view;
+      document.documentElement.dataset["ready"] = route.view;
+    } catch (error) {
+      if (gone()) return;
+      this.#overlay.replaceChildren();
+      this.#fail(error);
+    }
+  }
+
+  #close(): void {
+    delete document.documentElement.dataset["ready"];
+    this.#handle.view?.dispose();
+    this.#handle.view = this.#handle.name = null;
+    this.#stage.clear();
+    this.#panel.replaceChildren();
+    this.#overlay.replaceChildren();
+  }
+
+  #go(route: Route, files: readonly GivenFile[]): void {
+    // the query before the # would win over nothing, but look wrong
+    const url = new URL(location.href);
+    const embed = url.searchParams.get("embed");
+    url.search = embed === null ? "" : `?embed=${embed}`;
+    url.hash = linkOf(route);
+    history.pushState(null, "", url);
+    void this.#open(route, files);
+  }
+
+  #link(settings: Readonly<Record<string, string | null>>): void {
+    const params = new URLSearchParams(this.#route.params);
+    for (const [name, value] of Object.entries(settings)) {
+      if (value === null) params.delete(name);
+      else params.set(name, value);
+    }
+    this.#route = { view: this.#route.view, params };
+    history.replaceState(null, "", linkOf(this.#route));
+  }
+
+  #fail(error: unknown): void {
+    const text = reason(error);
+    this.#messages.say(text, "error");
+    if (!/module has stopped|out of memory|unreachable/.test(text)) return;
+    // the instance is lost, but not its code
+    void restartEngine().then(() => this.#open({ view: this.#route.view, params: new URLSearchParams() }, []));
+  }
+
+  async #copyLink(): Promise<void> {
+    const url = new URL(location.href);
+    url.search = "";
+    url.hash = linkOf(this.#route);
+    try {
+      await navigator.clipboard.writeText(url.href);
+      this.#messages.say("The link is in the clipboard.");
+    } catch {
+      this.#messages.say(url.href);
+    }
+  }
+
+  async #picture(): Promise<void> {
+    const picture = await this.#stage.picture();
+    if (picture) download(`marathon-${this.#route.view}.png`, picture);
+    else this.#messages.say("This browser cannot save the picture.", "error");
+  }
+
+  #listenForDrops(): void {
+    const target = document.documentElement;
+    target.addEventListener("dragover", (event) => {
+      event.preventDefault();
+      target.classList.add("dropping");
+    });
+    target.addEventListener("dragleave", (event) => {
+      if (event.relatedTarget === null) target.classList.remove("dropping");
+    });
+    target.addEventListener("drop", (event) => {
+      event.preventDefault();
+      target.classList.remove("dropping");
+      if (!event.dataTransfer) return;
+      droppedFiles(event.dataTransfer).then(
+        (files) => this.#openFiles(files),
+        (error: unknown) => this.#fail(error),
+      );
+    });
+  }
+
+  /** Opens the view for the kind of files that were dropped. */
+  #openFiles(files: readonly GivenFile[]): void {
+    const [first] = files;
+    if (!first) return;
+    const known = files.find(({ path }) => KINDS[extension(path)] !== undefined);
+    const view = known && KINDS[extension(known.path)];
+    if (view) {
+      // models come with meshes in glTF; a model decides
+      const model = files.some(({ path }) => KINDS[extension(path)] === "models");
+      this.#go({ view: model ? "models" : view, params: new URLSearchParams() }, files);
+    } else if (extension(first.path) === "zip") {
+      this.#messages.say(`${first.path} is an archive; unpack it and drop its folder.`, "error");
+    } else {
+      this.#messages.say(`${first.path} is not a model (.xml), a recording (.bvh, .glb, .gltf) or a policy (.safetensors, .onnx).`, "error");
+    }
+  }
+}
+
+export function start(root: HTMLElement): void {
+  try {
+    new Shell(root);
+  } catch (error) {
+    // no WebGL, for example
+    root.replaceChildren(el("p", { class: "loading", role: "alert" }, `Marathon cannot start: ${reason(error)}`));
+  }
+}

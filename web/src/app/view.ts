@@ -1,0 +1,35 @@
+/** What a view gets from the page, and what the page needs of it. */
+import type { Marathon } from "marathon-rl";
+import type { Stage } from "../scene/stage";
+import type { GivenFile } from "./files";
+import type { Kind } from "./messages";
+import type { ViewName } from "./route";
+
+export interface Context {
+  readonly stage: Stage;
+  readonly marathon: Marathon;
+  /** Place for the view's controls. */
+  readonly panel: HTMLElement;
+  /** Place on the picture, for text and thumb controls. */
+  readonly overlay: HTMLElement;
+  readonly params: URLSearchParams;
+  /** Files to open, from another view. */
+  readonly files: readonly GivenFile[];
+  /** Throws if the user has gone to another view: what loads late must not appear. The page ignores the error. */
+  stay(): void;
+  say(text: string, kind?: Kind): void;
+  /** Says why something failed, and replaces a module that has stopped. */
+  fail(error: unknown): void;
+  /** Writes settings into the link of the view. `null` removes one. */
+  link(settings: Readonly<Record<string, string | null>>): void;
+  /** Goes to another view. */
+  open(view: ViewName, params: Readonly<Record<string, string>>, files?: readonly GivenFile[]): void;
+  /** Opens a view for files by their kind. */
+  openFiles(files: readonly GivenFile[]): void;
+}
+
+export interface View {
+  dispose(): void;
+}
+
+export type MakeView = (context: Context) => View | Promise<View>;

@@ -1,0 +1,35 @@
+/** Policies that the user keeps in the browser. */
+
+export interface Kept {
+  readonly name: string;
+  readonly bytes: Uint8Array;
+}
+
+const PREFIX = "marathon.policy.";
+
+function encode(bytes: Uint8Array): string {
+  let text = "";
+  for (const byte of bytes) text += String.fromCharCode(byte);
+  return btoa(text);
+}
+
+/** Keeps a policy. Fails where the browser forbids storage or has no space left. */
+export function keep(name: string, bytes: Uint8Array): void {
+  localStorage.setItem(PREFIX + name, encode(bytes));
+}
+
+export function kept(): Kept[] {
+  try {
+    const names = Object.keys(localStorage).filter((key) => key.startsWith(PREFIX));
+    return names.sort().map((key) => {
+      const bytes = Uint8Array.from(atob(localStorage.getItem(key) ?? ""), (character) => character.charCodeAt(0));
+      return { name: key.slice(PREFIX.length), bytes };
+    });
+  } catch {
+    return [];
+  }
+}
+
+export function forget(name: string): void {
+  localStorage.removeItem(PREFIX + name);
+}

@@ -1,0 +1,12 @@
+/** What the page and the worker that trains say to each other. */
+import type { Config, Iteration } from "marathon-rl";
+
+export type ToWorker =
+  | { readonly type: "start"; readonly module: WebAssembly.Module; readonly lanes: "relaxed" | "exact"; readonly agent: string; readonly config: Config }
+  | { readonly type: "pause" }
+  | { readonly type: "continue" };
+
+export type FromWorker =
+  | { readonly type: "point"; readonly iteration: Iteration; readonly seconds: number }
+  | { readonly type: "policy"; readonly bytes: Uint8Array; readonly done: boolean }
+  | { readonly type: "error"; readonly message: string };

@@ -1,0 +1,19 @@
+import { fileURLToPath } from "node:url";
+import { defineConfig } from "vite";
+import { repositoryAssets } from "./build/assets";
+import { offline } from "./build/offline";
+
+const here = (path: string): string => fileURLToPath(new URL(path, import.meta.url));
+
+export default defineConfig({
+  // the page works from any folder of any host
+  base: "./",
+  plugins: [
+    repositoryAssets({ modules: here("../crates/wasm/npm/dist"), policies: here("../assets/policies") }),
+    offline(here("public"), here("build/sw.js")),
+  ],
+  build: { target: "es2022", assetsInlineLimit: 0, modulePreload: { polyfill: false } },
+  worker: { format: "es" },
+  // the package finds its modules by the folder that the page passes
+  optimizeDeps: { exclude: ["marathon-rl"] },
+});
