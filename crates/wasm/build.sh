@@ -32,4 +32,4 @@ done
 cd npm
 [ -d node_modules ] || npm ci --no-audit --no-fund --silent
 npx tsc
-node check.mjs
+node finish.mjs

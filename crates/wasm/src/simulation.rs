@@ -34,7 +34,10 @@ impl Simulation {
         let resolve = |path: &str| {
             let known = request.files().get(path);
             known.cloned().ok_or_else(|| {
-                missing.borrow_mut().push(path.to_string());
+                let mut missing = missing.borrow_mut();
+                if !missing.iter().any(|known| known == path) {
+                    missing.push(path.to_string());
+                }
                 "this file was not given".into()
             })
         };
