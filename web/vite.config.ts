@@ -9,7 +9,11 @@ export default defineConfig({
   // the page works from any folder of any host
   base: "./",
   plugins: [
-    repositoryAssets({ modules: here("../crates/wasm/npm/dist"), policies: here("../assets/policies") }),
+    repositoryAssets({
+      modules: here("../crates/wasm/npm/dist"),
+      policies: here("../assets/policies"),
+      motions: here("../assets/motions/marathon_man"),
+    }),
     offline(here("public"), here("build/sw.js")),
   ],
   build: { target: "es2022", assetsInlineLimit: 0, modulePreload: { polyfill: false } },

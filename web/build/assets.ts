@@ -1,20 +1,22 @@
 /**
- * Files of the repository that the page loads at run time: the WebAssembly modules, under a folder with their hash, and the
- * policies. The development server serves them from their place; a build copies them.
+ * Files of the repository that the page loads at run time: the WebAssembly modules, under a folder with their hash, the policies
+ * and some clips. The development server serves them from their place; a build copies them.
  */
 import { createHash } from "node:crypto";
 import { existsSync, readFileSync, readdirSync } from "node:fs";
 import { join } from "node:path";
 import type { Plugin } from "vite";
+import { CLIPS } from "../src/motion/samples";
 
 const MODULES = ["relaxed.wasm", "exact.wasm"];
 
 export interface Folders {
   readonly modules: string;
   readonly policies: string;
+  readonly motions: string;
 }
 
-export function repositoryAssets({ modules, policies }: Folders): Plugin {
+export function repositoryAssets({ modules, policies, motions }: Folders): Plugin {
   const found = MODULES.filter((name) => existsSync(join(modules, name)));
   if (found.length === 0) throw new Error(`${modules} has no module; run crates/wasm/build.sh first`);
   const hash = createHash("sha256");
@@ -26,6 +28,7 @@ export function repositoryAssets({ modules, policies }: Folders): Plugin {
   for (const name of readdirSync(policies).filter((name) => name.endsWith(".safetensors"))) {
     files.set(`policies/${name}`, join(policies, name));
   }
+  for (const name of CLIPS) files.set(`motions/${name}.motion`, join(motions, `${name}.motion`));
   return {
     name: "repository-assets",
     config: () => ({ define: { __WASM_FOLDER__: JSON.stringify(folder) } }),

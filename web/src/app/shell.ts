@@ -66,8 +66,12 @@ class Shell {
     const panel = el("section", { class: "panel", "aria-label": "Controls" }, this.#panelToggle(), this.#panel);
     const main = el("main", { id: "main" }, stageBox, this.#overlay, panel);
     root.replaceChildren(embedded ? this.#corner() : this.#header(), main, this.#messages.element);
-    if (innerWidth < 700 || embedded) panel.classList.add("folded");
+    if (innerWidth <= 760 || embedded) panel.classList.add("folded");
     this.#stage = new Stage(this.#canvas, reducedMotion());
+    new ResizeObserver(() => {
+      const beside = innerWidth > 760 && !panel.classList.contains("folded");
+      this.#stage.setCovered(beside ? panel.offsetLeft + panel.offsetWidth : 0);
+    }).observe(panel);
     this.#theme.onChange((theme) => this.#stage.setTheme(theme));
     this.#handle = { view: null, name: null, stage: this.#stage, engine };
     window.marathonPage = this.#handle;
@@ -113,7 +117,7 @@ class Shell {
     const fold = button("Controls", () => {
       const folded = fold.parentElement?.classList.toggle("folded") ?? false;
       fold.setAttribute("aria-expanded", String(!folded));
-    }, { class: "fold", "aria-controls": "panel", "aria-expanded": String(innerWidth >= 700) });
+    }, { class: "fold", "aria-controls": "panel", "aria-expanded": String(innerWidth > 760) });
     return fold;
   }
 

@@ -23,7 +23,7 @@ interface Task {
 const TASKS: readonly Task[] = [
   { name: "hopper", label: "Hopper", agent: "Hopper-v0", agents: 12, gap: 0.9, distance: 9, millions: 4 },
   { name: "walker2d", label: "Walker", agent: "Walker2d-v0", agents: 12, gap: 1, distance: 10, millions: 6 },
-  { name: "ant", label: "Ant", agent: "Ant-v0", agents: 8, gap: 2.2, distance: 14, millions: 8 },
+  { name: "ant", label: "Ant", agent: "Ant-v0", agents: 8, gap: 2.2, distance: 14, millions: 6 },
 ];
 
 type Phase = "ready" | "running" | "paused" | "done";

@@ -5,7 +5,12 @@ import type { FromWorker, ToWorker } from "./messages";
 /** Time between two policies that the page gets, ms. */
 const POLICY_EVERY = 500;
 
-const scope = self as unknown as DedicatedWorkerGlobalScope;
+// the types of the page describe a window
+interface WorkerScope {
+  onmessage: ((event: MessageEvent<ToWorker>) => void) | null;
+  postMessage(message: FromWorker, transfer: Transferable[]): void;
+}
+const scope = self as unknown as WorkerScope;
 const send = (message: FromWorker, transfer: Transferable[] = []): void => scope.postMessage(message, transfer);
 
 let trainer: Trainer | null = null;

@@ -13,15 +13,15 @@ import type { ModelInfo } from "marathon-rl";
 import { type Rod, axisOf, rodsOf } from "./rods";
 
 /** Darkness below a body that touches the ground. */
-const DARKEST = 0.6;
+const DARKEST = 0.42;
 /** Height at which a disc is half as dark, m. */
-const HALF_HEIGHT = 0.35;
+const HALF_HEIGHT = 0.75;
 /** Growth of a disc's radius with the height of its body. */
-const SPREAD = 0.35;
+const SPREAD = 0.25;
 /** Distance between a disc and the ground, m. */
 const LIFT = 0.012;
 /** Radius of a disc relative to its body: its edge is soft. */
-const SOFT = 1.8;
+const SOFT = 2.4;
 /** Most discs of an agent. */
 const MOST = 24;
 

@@ -28,14 +28,18 @@ export class QualityControl {
   /** Measurements in a row that were fast. */
   #fast = 0;
 
-  constructor(software: boolean) {
-    this.level = software ? 0 : 2;
+  readonly #fixed: boolean;
+
+  /** A `fixed` level stays, whatever it costs. */
+  constructor(software: boolean, fixed: Level | null) {
+    this.level = fixed ?? (software ? 0 : 2);
+    this.#fixed = fixed !== null;
     if (software) this.#ceiling = 1;
   }
 
   /** Takes in the time of a frame, ms. Returns whether the level changed. */
   frame(milliseconds: number): boolean {
-    if (milliseconds > INTERRUPTION) return false;
+    if (this.#fixed || milliseconds > INTERRUPTION) return false;
     this.#sum += milliseconds;
     if (++this.#count < FRAMES) return false;
     const mean = this.#sum / this.#count;
@@ -55,6 +59,12 @@ export class QualityControl {
     this.#fast = 0;
     return true;
   }
+}
+
+/** The level of a link, such as `?quality=3`. */
+export function fixedLevel(params: URLSearchParams): Level | null {
+  const level = [0, 1, 2, 3].find((level) => String(level) === params.get("quality"));
+  return level === undefined ? null : (level as Level);
 }
 
 /** Whether a processor renders in place of a graphics card. */

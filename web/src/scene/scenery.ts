@@ -4,7 +4,7 @@ import {
   CanvasTexture,
   Color,
   DirectionalLight,
-  Fog,
+  FogExp2,
   Group,
   HemisphereLight,
   Mesh,
@@ -28,8 +28,8 @@ const SIDE = 1024;
 const REACH = 320;
 /** Radius of the sky, m. */
 const SKY = 600;
-/** Distances between which the ground fades, m. */
-const FADE: readonly [number, number] = [18, 130];
+/** Density of the haze, 1/m: 24 % of the ground's color is gone at 20 m, 91 % at 60 m. */
+const HAZE = 0.026;
 /** Depth of the ground below figures that run on height fields alone, m. */
 const DEEP = 6;
 /** Where the sun stands, and the light that draws an edge around figures. */
@@ -63,7 +63,7 @@ export class Scenery {
     this.#sky = new Mesh(new SphereGeometry(SKY, 48, 24), skyMaterial());
     this.#sky.frustumCulled = false;
     this.#sky.renderOrder = -1;
-    scene.fog = new Fog(0xffffff, ...FADE);
+    scene.fog = new FogExp2(0xffffff, HAZE);
     const { shadow } = this.#sun;
     shadow.mapSize.set(2048, 2048);
     Object.assign(shadow.camera, { left: -SHADOWS, right: SHADOWS, top: SHADOWS, bottom: -SHADOWS, near: 1, far: 40 });
@@ -82,7 +82,7 @@ export class Scenery {
 
   setPalette({ horizon, zenith, ground, sun, lights }: Palette): void {
     const color = (rgb: Rgb): Color => new Color().setRGB(...rgb, SRGBColorSpace);
-    this.#scene.fog = new Fog(color(horizon), ...FADE);
+    this.#scene.fog = new FogExp2(color(horizon), HAZE);
     this.#ground.material.color = color(ground);
     // the shader writes sRGB: fog is sRGB too, and both must meet at the horizon
     const { uniforms } = this.#sky.material;

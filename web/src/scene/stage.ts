@@ -3,7 +3,7 @@ import { Group, PCFShadowMap, PerspectiveCamera, Scene, Vector3, WebGLRenderer }
 import type { Theme } from "../app/theme";
 import { FollowCamera } from "./camera";
 import { DAY, DUSK } from "./colors";
-import { type Level, QualityControl, pixelRatio, rendersInSoftware } from "./quality";
+import { type Level, QualityControl, fixedLevel, pixelRatio, rendersInSoftware } from "./quality";
 import { Scenery } from "./scenery";
 
 /** What a view does in a frame. */
@@ -29,14 +29,17 @@ export class Stage {
   readonly #quality: QualityControl;
   #actor: Actor | null = null;
   #last = 0;
+  /** Part of the picture's left side that something covers, CSS pixels. */
+  #covered = 0;
   /** Frames so far. */
   frames = 0;
 
   constructor(canvas: HTMLCanvasElement, calm: boolean) {
     this.canvas = canvas;
     const software = rendersInSoftware();
-    this.#quality = new QualityControl(software);
-    this.#renderer = new WebGLRenderer({ canvas, antialias: !software, powerPreference: "high-performance" });
+    const fixed = fixedLevel(new URLSearchParams(location.search));
+    this.#quality = new QualityControl(software, fixed);
+    this.#renderer = new WebGLRenderer({ canvas, antialias: !software || fixed !== null, powerPreference: "high-performance" });
     this.#renderer.shadowMap.type = PCFShadowMap;
     this.scenery = new Scenery(this.#scene);
     this.#scene.add(this.world);
@@ -53,6 +56,12 @@ export class Stage {
 
   setTheme(theme: Theme): void {
     this.scenery.setPalette(theme === "dark" ? DUSK : DAY);
+  }
+
+  /** Moves the middle of the picture beside what covers its left side. */
+  setCovered(pixels: number): void {
+    this.#covered = pixels;
+    this.#resize();
   }
 
   /** Lets a view move the picture, in place of the last one. */
@@ -103,6 +112,9 @@ export class Stage {
     this.camera.aspect = width / height;
     // a tall screen must show the figure's width as well
     this.camera.fov = width < height ? 54 : 42;
+    const covered = Math.min(this.#covered, 0.5 * width);
+    if (covered > 0) this.camera.setViewOffset(width, height, -covered / 2, 0, width, height);
+    else this.camera.clearViewOffset();
     this.camera.updateProjectionMatrix();
   }
 }

@@ -1,0 +1,98 @@
+/** A model that the page simulates: physics steps in real time, hands and controls. */
+import { Vector3 } from "three";
+import type { Simulation } from "marathon-rl";
+import { Clock } from "../physics/clock";
+import { Puppet } from "../scene/puppet";
+import type { Level } from "../scene/quality";
+import type { Actor, Stage } from "../scene/stage";
+
+/** Time between two forces of the hand, s. */
+const PERIOD = 0.01;
+
+export class Table implements Actor {
+  readonly puppet: Puppet;
+  readonly clock: Clock;
+  readonly controls: Float64Array;
+  readonly #simulation: Simulation;
+  readonly #stage: Stage;
+  readonly #steps: number;
+  readonly #onError: (error: unknown) => void;
+  readonly #focus = new Vector3();
+  #failed = false;
+  #blowups = 0;
+
+  constructor(stage: Stage, simulation: Simulation, onError: (error: unknown) => void) {
+    this.#stage = stage;
+    this.#simulation = simulation;
+    this.#onError = onError;
+    const { model } = simulation;
+    this.#steps = Math.max(Math.round(PERIOD / model.timestep), 1);
+    const dt = this.#steps * model.timestep;
+    this.clock = new Clock(dt);
+    this.puppet = new Puppet(stage, simulation, dt, false);
+    this.controls = Float64Array.from(simulation.ctrl);
+    const size = this.#size();
+    this.#focus.z = Math.max(this.#focus.z, 0.05);
+    stage.follow.set("side", Math.min(Math.max(2.6 * size, 1), 40));
+    stage.follow.yaw += 0.3;
+    stage.follow.turn(0.3, 0.12);
+  }
+
+  frame(dt: number): Vector3 {
+    if (!this.#failed) {
+      try {
+        for (let i = this.clock.steps(dt); i > 0; i--) this.step();
+      } catch (error) {
+        this.#failed = true;
+        this.#onError(error);
+      }
+    }
+    const center = this.puppet.show(this.clock.share);
+    // models stay where they are: only what leaves the picture is followed
+    if (center.distanceTo(this.#focus) > 0.5 * this.#stage.follow.distance) this.#focus.lerp(center, 0.05);
+    return this.#focus;
+  }
+
+  step(): void {
+    this.#simulation.ctrl.set(this.controls);
+    this.puppet.beforeStep();
+    const finite = this.#simulation.step(this.#steps);
+    this.puppet.takePoses(!finite);
+    if (!finite && ++this.#blowups === 1) {
+      this.#onError(new Error("the state became infinite, so that the model is back at its start; a smaller timestep may help"));
+    }
+  }
+
+  reset(): void {
+    this.#simulation.reset();
+    this.controls.set(this.#simulation.ctrl);
+    this.puppet.takePoses(true);
+  }
+
+  quality(level: Level): void {
+    this.puppet.setQuality(level);
+  }
+
+  dispose(): void {
+    this.puppet.dispose();
+    this.#simulation.free();
+  }
+
+  /** Finds the middle of what moves, and returns how far it reaches, m. */
+  #size(): number {
+    const { model } = this.#simulation;
+    const poses = this.#simulation.poses();
+    const [low, high] = [new Vector3(Infinity, Infinity, Infinity), new Vector3(-Infinity, -Infinity, -Infinity)];
+    for (const [i, { kind, size, body }] of model.geoms.entries()) {
+      if (kind === "plane" || kind === "hfield") continue;
+      if (body === 0 && Math.max(...size) > 5) continue;
+      const at = new Vector3(poses[16 * i + 12], poses[16 * i + 13], poses[16 * i + 14]);
+      const reach = Math.min(Math.max(...size), 5);
+      low.min(at.clone().subScalar(reach));
+      high.max(at.clone().addScalar(reach));
+    }
+    if (!Number.isFinite(low.x)) return 1;
+    this.#focus.copy(low).add(high).multiplyScalar(0.5);
+    return Math.max(high.x - low.x, high.y - low.y, high.z - low.z, 0.2);
+  }
+}
