@@ -2,6 +2,7 @@ import { fileURLToPath } from "node:url";
 import { defineConfig } from "vite";
 import { repositoryAssets } from "./build/assets";
 import { offline } from "./build/offline";
+import { preload } from "./build/preload";
 
 const here = (path: string): string => fileURLToPath(new URL(path, import.meta.url));
 
@@ -14,6 +15,7 @@ export default defineConfig({
       policies: here("../assets/policies"),
       motions: here("../assets/motions/marathon_man"),
     }),
+    preload("src/app/shell.ts"),
     offline(here("public"), here("build/sw.js")),
   ],
   build: { target: "es2022", assetsInlineLimit: 0, modulePreload: { polyfill: false } },

@@ -72,7 +72,7 @@ export interface Palette {
 export const DAY: Palette = {
   horizon: [0.8, 0.87, 0.93],
   zenith: [0.25, 0.48, 0.78],
-  ground: [1.1, 1.04, 0.96],
+  ground: [1.04, 1.01, 0.97],
   sun: [1, 0.96, 0.88],
   lights: [3.1, 0.8, 1.8],
 };
