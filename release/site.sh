@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds the site of the documentation in target/site: the book, and below api the pages of all crates but those for Bevy.
+# Builds the site in target/site: the book, below api the pages of all crates but those for Bevy, and below play the web page.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 site=target/site
@@ -13,5 +13,8 @@ mkdir -p "$site"
 cp -R target/book/. "$site/"
 cp -R target/api/doc "$site/api"
 rm -f "$site/api/.lock"
+web/build.sh
+rm -rf "$site/play"
+cp -R web/dist "$site/play"
 echo '<!DOCTYPE html><meta http-equiv="refresh" content="0; url=marathon_rl/index.html"><title>Marathon</title>' > "$site/api/index.html"
 echo "$site" >&2

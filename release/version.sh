@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Checks that Cargo.toml, Cargo.lock and CHANGELOG.md agree about the version, or sets it: release/version.sh [VERSION].
+# Checks that Cargo.toml, Cargo.lock, the npm package and CHANGELOG.md agree about the version, or sets it: release/version.sh [VERSION].
 # MARATHON_TAG=v1.2.3 checks a tag as well.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -12,12 +12,15 @@ if [ "$#" != 0 ]; then
   # the version of the workspace, and those of the crates that it lists by path
   sed -i.old -e "s/^version = \"$current\"$/version = \"$new\"/" -e "/path = /s/version = \"$current\"/version = \"$new\"/" Cargo.toml
   rm Cargo.toml.old
+  (cd crates/wasm/npm && npm version --no-git-tag-version --allow-same-version "$new" > /dev/null)
   cargo update --quiet --offline --workspace
   current="$new"
 fi
 
 wrong=$(grep -n 'path = ".*version = ' Cargo.toml | grep -v "version = \"$current\"" || true)
 [ -z "$wrong" ] || fail "Cargo.toml has dependencies of another version than $current:"$'\n'"$wrong"
+npm=$(sed -n 's/^  "version": "\(.*\)",$/\1/p' crates/wasm/npm/package.json)
+[ "$npm" = "$current" ] || fail "crates/wasm/npm/package.json has version $npm, expected $current"
 cargo metadata --locked --format-version 1 > /dev/null || fail 'Cargo.lock is out of date: cargo update --workspace'
 if [ -n "${MARATHON_TAG:-}" ]; then
   [ "$MARATHON_TAG" = "v$current" ] || fail "the tag is $MARATHON_TAG, but the version $current"

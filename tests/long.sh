@@ -5,7 +5,7 @@
 #   release   wheels, programs and archives of all platforms that this system can build, tried as a user would
 #   aarch64   the Python tests with the wheel for Arm, under qemu
 #   crates    packs and compiles the published crates
-#   player    twenty random players in the game, ten minutes of its time each
+#   player    twenty random players in the game, and four with a camera in each of five worlds, ten minutes of its time each
 set -euo pipefail
 cd "$(dirname "$0")/.."
 parts=("$@")
@@ -25,7 +25,10 @@ for part in "${parts[@]}"; do
       tests/aarch64.sh release/dist/marathon_rl-*manylinux*aarch64*.whl
       ;;
     crates) release/publish.sh --dry-run ;;
-    player) cargo test --release --workspace --test a_stranger_plays -- --ignored --nocapture ;;
+    player)
+      cargo test --release --workspace --test a_stranger_plays -- --ignored --nocapture
+      MARATHON_TEST_LONG=yes cargo test --release --workspace --test the_camera_stays_outside -- --nocapture
+      ;;
     *) echo "tests/long.sh: no part '$part'; there are fuzz, release, aarch64, crates and player" >&2 && exit 2 ;;
   esac
 done
