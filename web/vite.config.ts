@@ -1,8 +1,8 @@
 import { fileURLToPath } from "node:url";
 import { defineConfig } from "vite";
-import { repositoryAssets } from "./build/assets";
-import { offline } from "./build/offline";
-import { preload } from "./build/preload";
+import { repositoryAssets } from "./build/assets.ts";
+import { offline } from "./build/offline.ts";
+import { preload } from "./build/preload.ts";
 
 const here = (path: string): string => fileURLToPath(new URL(path, import.meta.url));
 

@@ -6,7 +6,7 @@ import { createHash } from "node:crypto";
 import { existsSync, readFileSync, readdirSync } from "node:fs";
 import { join } from "node:path";
 import type { Plugin } from "vite";
-import { CLIPS } from "../src/motion/samples";
+import { CLIPS } from "../src/motion/samples.ts";
 
 const MODULES = ["relaxed.wasm", "exact.wasm"];
 

@@ -52,6 +52,8 @@ class Shell {
   readonly #canvas = el("canvas", { tabindex: 0, role: "application", "aria-label": "Picture of the simulation" });
   readonly #overlay = el("div", { class: "overlay" });
   readonly #panel = el("div", { class: "panel-body", id: "panel" });
+  readonly #fold = button("Controls", () => this.#setFolded(!this.#side.classList.contains("folded")), { class: "fold", "aria-controls": "panel" });
+  readonly #side = el("section", { class: "panel", "aria-label": "Controls" });
   readonly #links = new Map<ViewName, HTMLAnchorElement>();
   readonly #stage: Stage;
   readonly #handle: PageHandle;
@@ -63,15 +65,11 @@ class Shell {
     const embedded = isEmbedded(new URL(location.href));
     document.documentElement.classList.toggle("embedded", embedded);
     const stageBox = el("div", { class: "stage" }, this.#canvas);
-    const panel = el("section", { class: "panel", "aria-label": "Controls" }, this.#panelToggle(), this.#panel);
-    const main = el("main", { id: "main" }, stageBox, this.#overlay, panel);
+    this.#side.append(this.#fold, this.#panel);
+    const main = el("main", { id: "main" }, stageBox, this.#overlay, this.#side);
     root.replaceChildren(embedded ? this.#corner() : this.#header(), main, this.#messages.element);
-    if (innerWidth <= 760 || embedded) panel.classList.add("folded");
     this.#stage = new Stage(this.#canvas, reducedMotion());
-    new ResizeObserver(() => {
-      const beside = innerWidth > 760 && !panel.classList.contains("folded");
-      this.#stage.setCovered(beside ? panel.offsetLeft + panel.offsetWidth : 0);
-    }).observe(panel);
+    new ResizeObserver(() => this.#uncover()).observe(this.#side);
     this.#theme.onChange((theme) => this.#stage.setTheme(theme));
     this.#handle = { view: null, name: null, stage: this.#stage, engine };
     window.marathonPage = this.#handle;
@@ -113,12 +111,20 @@ class Shell {
     return el("header", { class: "slim" }, el("h1", { class: "visually-hidden" }, "Marathon"), link);
   }
 
-  #panelToggle(): HTMLElement {
-    const fold = button("Controls", () => {
-      const folded = fold.parentElement?.classList.toggle("folded") ?? false;
-      fold.setAttribute("aria-expanded", String(!folded));
-    }, { class: "fold", "aria-controls": "panel", "aria-expanded": String(innerWidth > 760) });
-    return fold;
+  #setFolded(folded: boolean): void {
+    this.#side.classList.toggle("folded", folded);
+    this.#fold.setAttribute("aria-expanded", String(!folded));
+  }
+
+  /** Shows the figure beside the panel, or above it on a narrow screen. */
+  #uncover(): void {
+    const { offsetLeft, offsetTop, offsetWidth, parentElement } = this.#side;
+    const folded = this.#side.classList.contains("folded");
+    const below = narrow() && offsetTop > 100;
+    this.#stage.setCovered(
+      folded || narrow() ? 0 : offsetLeft + offsetWidth,
+      folded || !below ? 0 : (parentElement?.clientHeight ?? 0) - offsetTop,
+    );
   }
 
   async #open(route: Route, files: readonly GivenFile[]): Promise<void> {
@@ -130,6 +136,9 @@ class Shell {
       if (view === route.view) link.setAttribute("aria-current", "page");
       else link.removeAttribute("aria-current");
     }
+    document.documentElement.dataset["view"] = route.view;
+    // views with thumb controls begin with a free picture
+    this.#setFolded(isEmbedded(new URL(location.href)) || (narrow() && (route.view === "play" || route.view === "policies")));
     document.title = `${NAMES[route.view]} · Marathon`;
     this.#overlay.append(el("p", { class: "loading", role: "status" }, "Loading"));
     try {
@@ -257,6 +266,11 @@ class Shell {
       this.#messages.say(`${first.path} is not a model (.xml), a recording (.bvh, .glb, .gltf) or a policy (.safetensors, .onnx).`, "error");
     }
   }
+}
+
+/** Whether the panel has no place beside the figure. */
+function narrow(): boolean {
+  return innerWidth <= 760;
 }
 
 export function start(root: HTMLElement): void {

@@ -33,7 +33,7 @@ export const KEYS: readonly (readonly [string, string])[] = [
   [".", "one step"],
   ["- and =", "slower, faster"],
   ["N", "next character"],
-  ["G", "let go"],
+  ["G", "autopilot"],
   ["?", "keys"],
 ];
 

@@ -43,7 +43,7 @@ export async function makePlay(context: Context): Promise<PlayView> {
     select("Character", choices, character.name, go),
     character.name === "Course" ? el("p", {}, "The walker finds its way by itself. Each seed is another course.") : "",
     player.controls,
-    el("div", { class: "row" }, button("New seed", reseed), button("Let go", () => player.act("release"), { title: "The task's own schedule commands again" })),
+    el("div", { class: "row" }, button("New seed", reseed), button("Autopilot", () => player.act("release"), { title: "The commands come from the task's own schedule" })),
   );
   return { player, dispose: () => player.dispose() };
 }

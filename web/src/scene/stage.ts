@@ -29,8 +29,8 @@ export class Stage {
   readonly #quality: QualityControl;
   #actor: Actor | null = null;
   #last = 0;
-  /** Part of the picture's left side that something covers, CSS pixels. */
-  #covered = 0;
+  /** Parts of the picture's left side and bottom that something covers, CSS pixels. */
+  #covered: readonly [number, number] = [0, 0];
   /** Frames so far. */
   frames = 0;
 
@@ -58,9 +58,9 @@ export class Stage {
     this.scenery.setPalette(theme === "dark" ? DUSK : DAY);
   }
 
-  /** Moves the middle of the picture beside what covers its left side. */
-  setCovered(pixels: number): void {
-    this.#covered = pixels;
+  /** Moves the middle of the picture to what is not covered. */
+  setCovered(left: number, bottom: number): void {
+    this.#covered = [left, bottom];
     this.#resize();
   }
 
@@ -112,8 +112,8 @@ export class Stage {
     this.camera.aspect = width / height;
     // a tall screen must show the figure's width as well
     this.camera.fov = width < height ? 54 : 42;
-    const covered = Math.min(this.#covered, 0.5 * width);
-    if (covered > 0) this.camera.setViewOffset(width, height, -covered / 2, 0, width, height);
+    const [left, bottom] = [Math.min(this.#covered[0], 0.5 * width), Math.min(this.#covered[1], 0.6 * height)];
+    if (left + bottom > 0) this.camera.setViewOffset(width, height, -left / 2, bottom / 2, width, height);
     else this.camera.clearViewOffset();
     this.camera.updateProjectionMatrix();
   }
