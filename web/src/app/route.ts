@@ -1,7 +1,12 @@
 /** Links: the view and its settings are in the part of the address after `#`, such as `#/play?agent=Ant&seed=3`. */
 
+import type { OptionValue } from "marathon-rl";
+
 export const VIEWS = ["play", "learn", "models", "motion", "policies"] as const;
 export type ViewName = (typeof VIEWS)[number];
+
+/** Settings of the whole page, before the `#`. */
+const PAGE_WIDE = new Set(["embed", "lanes", "quality"]);
 
 export interface Route {
   readonly view: ViewName;
@@ -12,8 +17,9 @@ export interface Route {
 export function parseRoute(url: URL): Route {
   const [path = "", query = ""] = url.hash.replace(/^#\/?/, "").split("?", 2);
   const params = new URLSearchParams(query);
+  const own = new Set(params.keys());
   for (const [name, value] of url.searchParams) {
-    if (name !== "embed" && !params.has(name)) params.set(name, value);
+    if (!PAGE_WIDE.has(name) && !own.has(name)) params.append(name, value);
   }
   const named = VIEWS.find((view) => view === path);
   const implied = params.has("model") ? "models" : params.has("policy") ? "policies" : "play";
@@ -28,6 +34,18 @@ export function linkOf({ view, params }: Route): string {
 /** Whether the page is shown inside another one. */
 export function isEmbedded(url: URL): boolean {
   return url.searchParams.get("embed") === "1";
+}
+
+/** Options of a task in a link: `option=difficulty=0.5&option=course=steps`. */
+export function optionsOf(params: URLSearchParams): Record<string, OptionValue> {
+  const options: Record<string, OptionValue> = {};
+  for (const text of params.getAll("option")) {
+    const [name = "", ...rest] = text.split("=");
+    const value = rest.join("=");
+    const number = value.trim() === "" ? Number.NaN : Number(value);
+    options[name] = value === "true" || value === "false" ? value === "true" : Number.isFinite(number) ? number : value;
+  }
+  return options;
 }
 
 /** A whole number of an address, within limits. */

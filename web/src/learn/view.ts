@@ -103,12 +103,12 @@ class Learn implements View {
     const slow = "Training needs relaxed SIMD, which this browser does not have: here it is about ten times slower.";
     panel.replaceChildren(
       el("h2", {}, "Learn"),
-      el("p", {}, `${this.#task.label} learns to move from nothing, in this page.`),
+      el("p", { class: "roomy" }, `${this.#task.label} learns to move from nothing, in this page.`),
       marathon.lanes === "exact" ? el("p", { class: "notice" }, slow) : "",
-      select("Body", TASKS.map(({ name, label }) => ({ value: name, label })), this.#task.name, (name) => open("learn", { agent: name })),
       el(
         "div",
-        { class: "pair" },
+        { class: "trio" },
+        select("Body", TASKS.map(({ name, label }) => ({ value: name, label })), this.#task.name, (name) => open("learn", { agent: name })),
         number("Seed", this.#seed, 0, (seed) => {
           this.#seed = seed;
           this.#context.link({ seed: String(seed) });
@@ -120,8 +120,7 @@ class Learn implements View {
       ),
       el("div", { class: "row" }, this.#main, ...this.#after),
       this.#numbers,
-      this.#returns.element,
-      this.#speeds.element,
+      el("div", { class: "charts" }, this.#returns.element, this.#speeds.element),
     );
   }
 

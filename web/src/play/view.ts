@@ -1,7 +1,7 @@
 /** Play: characters that the user steers, pushes and throws balls at. */
 import { button, el, select } from "../app/dom";
 import { policy } from "../app/engine";
-import { integer } from "../app/route";
+import { integer, optionsOf } from "../app/route";
 import type { Context, View } from "../app/view";
 import { CHARACTERS, characterOf } from "../views/characters";
 import { Player } from "./player";
@@ -24,9 +24,11 @@ export async function makePlay(context: Context): Promise<PlayView> {
     go(CHARACTERS[(at + 1) % CHARACTERS.length]?.name ?? character.name);
   };
   context.stay();
+  const options = optionsOf(params);
+  const given = Object.keys(options).length > 0 ? { options } : {};
   const player = new Player(context, {
     agent: character.agent,
-    env: { policy: bytes, seed },
+    env: { policy: bytes, seed, ...given },
     distance: character.distance,
     skin: character.skin,
     next,

@@ -3,6 +3,7 @@ import type { PolicyInfo } from "marathon-rl";
 import { button, el } from "../app/dom";
 import { fetchBytes, pageUrl } from "../app/engine";
 import { baseName, fileButton } from "../app/files";
+import { optionsOf } from "../app/route";
 import type { Context, View } from "../app/view";
 import { forget, kept } from "../learn/kept";
 import { Player } from "../play/player";
@@ -59,10 +60,12 @@ class Policies implements View {
   }
 
   #play(agent: string, policy: Uint8Array): void {
-    const probe = this.#context.marathon.env(agent, { policy });
+    const options = optionsOf(this.#context.params);
+    const env = Object.keys(options).length > 0 ? { policy, options } : { policy };
+    const probe = this.#context.marathon.env(agent, env);
     const bodies = probe.model.bodies.map(({ name }) => name);
     probe.free();
-    this.#player = new Player(this.#context, { agent, env: { policy }, distance: 4.8, skin: skinOf(bodies) });
+    this.#player = new Player(this.#context, { agent, env, distance: 4.8, skin: skinOf(bodies) });
   }
 
   #fill(): void {
