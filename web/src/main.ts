@@ -5,7 +5,7 @@ import { parseRoute } from "./app/route";
 import { characterOf } from "./views/characters";
 
 const { view, params } = parseRoute(new URL(location.href));
-// whoever needs them handles their errors
+// the view handles their errors
 engine().catch(() => {});
 if (view === "play") policy(characterOf(params.get("agent")).policy).catch(() => {});
 

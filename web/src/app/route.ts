@@ -13,6 +13,14 @@ export interface Route {
   readonly params: URLSearchParams;
 }
 
+/** The address with all settings of the view after the `#`. */
+export function tidy(url: URL): URL {
+  const tidied = new URL(url);
+  for (const name of [...tidied.searchParams.keys()]) if (!PAGE_WIDE.has(name)) tidied.searchParams.delete(name);
+  tidied.hash = linkOf(parseRoute(url));
+  return tidied;
+}
+
 /** The route of an address. `?model=`, `?agent=` and `?policy=` before the `#` count too. */
 export function parseRoute(url: URL): Route {
   const [path = "", query = ""] = url.hash.replace(/^#\/?/, "").split("?", 2);

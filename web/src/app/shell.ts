@@ -4,7 +4,7 @@ import { button, download, el } from "./dom";
 import { engine, restartEngine } from "./engine";
 import { type GivenFile, droppedFiles, extension } from "./files";
 import { Messages, reason } from "./messages";
-import { type Route, VIEWS, type ViewName, isEmbedded, linkOf, parseRoute } from "./route";
+import { type Route, VIEWS, type ViewName, isEmbedded, linkOf, parseRoute, tidy } from "./route";
 import type { MakeView, View } from "./view";
 import { Stage } from "../scene/stage";
 import { makePlay } from "../play/view";
@@ -82,6 +82,7 @@ class Shell {
       const next = parseRoute(new URL(location.href));
       if (linkOf(next) !== linkOf(this.#route)) void this.#open(next, []);
     });
+    history.replaceState(null, "", tidy(new URL(location.href)));
     void this.#open(this.#route, []);
   }
 
@@ -185,10 +186,7 @@ class Shell {
   }
 
   #go(route: Route, files: readonly GivenFile[]): void {
-    // the query before the # would win over nothing, but look wrong
     const url = new URL(location.href);
-    const embed = url.searchParams.get("embed");
-    url.search = embed === null ? "" : `?embed=${embed}`;
     url.hash = linkOf(route);
     history.pushState(null, "", url);
     void this.#open(route, files);

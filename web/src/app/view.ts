@@ -1,4 +1,4 @@
-/** What a view gets from the page, and what the page needs of it. */
+/** The interface between the page and its views. */
 import type { Marathon } from "marathon-rl";
 import type { Stage } from "../scene/stage";
 import type { GivenFile } from "./files";

@@ -1,4 +1,4 @@
-/** What the user wants, from whichever device: a stick, two buttons that are held, and actions that happen once. */
+/** The common state of all devices: a stick, two buttons that are held, and actions that happen once. */
 
 /** Things that happen once per press. */
 export type Action = "pause" | "step" | "restart" | "next" | "camera" | "push" | "throw" | "release" | "slower" | "faster" | "help";

@@ -4,7 +4,7 @@ import type { Picked } from "../scene/rods";
 import type { Stage } from "../scene/stage";
 import type { Ray } from "three";
 
-/** What can be taken hold of. */
+/** Bodies that can be pulled and pushed. */
 export interface Hands {
   pick(ray: Ray, slack: number): Picked | null;
   grab(picked: Picked): void;

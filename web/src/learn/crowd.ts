@@ -53,6 +53,7 @@ export class Crowd implements Actor {
     this.#geoms = new PoseTrack(16 * agents * model.geoms.length);
     this.#bodies = new PoseTrack(16 * agents * model.bodies.length);
     stage.world.add(this.#figure.group);
+    stage.scenery.setShadows(0.5 * gap * agents + 2);
     this.quality(stage.level);
     this.#take();
     this.#geoms.cut();

@@ -45,7 +45,7 @@ export async function makePlay(context: Context): Promise<PlayView> {
     select("Character", choices, character.name, go),
     character.name === "Course" ? el("p", {}, "The walker finds its way by itself. Each seed is another course.") : "",
     player.controls,
-    el("div", { class: "row" }, button("New seed", reseed), button("Autopilot", () => player.act("release"), { title: "The commands come from the task's own schedule" })),
+    el("div", { class: "row" }, button("New seed", reseed), player.arena.takesCommands && button("Autopilot", () => player.act("release"), { title: "The commands come from the task's own schedule" })),
   );
   return { player, dispose: () => player.dispose() };
 }

@@ -1,4 +1,4 @@
-/** Policies: any policy of ours, from a file, a link or this browser. The file says which task it is for. */
+/** Policies: any policy of Marathon, from a file, a link or this browser. The file names its task. */
 import type { PolicyInfo } from "marathon-rl";
 import { button, el } from "../app/dom";
 import { fetchBytes, pageUrl } from "../app/engine";

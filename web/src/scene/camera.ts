@@ -3,6 +3,8 @@ import { type PerspectiveCamera, Vector3 } from "three";
 
 /** Half-lives of the point that it looks at, level and upward, s. The upward one is longer: the bounce of a gait must not shake it. */
 const PIVOT: readonly [number, number] = [0.06, 0.25];
+/** The upward half-life for users who ask for little motion, s. */
+const CALM = 1;
 /** Half-life of turns, s. */
 const TURN = 0.04;
 /** Half-life of the target's velocity, s. */
@@ -34,7 +36,7 @@ export class FollowCamera {
   pitch = 0.2;
   distance = 5;
   angle: Angle = "side";
-  /** Whether it only moves with its target and by the user. */
+  /** Whether it never turns by itself, and hardly moves up and down. */
   calm = false;
   readonly #goal = { yaw: this.yaw, pitch: this.pitch, distance: this.distance };
   readonly #velocity = new Vector3();
@@ -84,7 +86,7 @@ export class FollowCamera {
     } else if (dt > 0) {
       const velocity = target.clone().sub(this.#last).divideScalar(dt).setZ(0);
       this.#velocity.lerp(velocity, done(VELOCITY, dt));
-      const [level, up] = this.calm ? [1, 1] : [done(PIVOT[0], dt), done(PIVOT[1], dt)];
+      const [level, up] = [done(PIVOT[0], dt), done(this.calm ? CALM : PIVOT[1], dt)];
       this.focus.x += (target.x - this.focus.x) * level;
       this.focus.y += (target.y - this.focus.y) * level;
       this.focus.z += (target.z - this.focus.z) * up;

@@ -1,4 +1,4 @@
-/** One figure that the page simulates: what it looks like, hands that pull it, balls that hit it. */
+/** One figure that the page simulates: its shapes or skin, the hand that pulls it, the balls that hit it. */
 import { BufferGeometry, Line, LineBasicMaterial, type Ray, Vector3 } from "three";
 import type { ModelInfo, Vector } from "marathon-rl";
 import type { Hands } from "../input/pointer";
@@ -13,7 +13,7 @@ import { type Picked, type Rod, pick, rodsOf } from "./rods";
 import { Skin } from "./skin";
 import type { Stage } from "./stage";
 
-/** What moves the figure. */
+/** The simulation behind a figure. */
 export interface Body {
   readonly model: ModelInfo;
   poses(): Float32Array;

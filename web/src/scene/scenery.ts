@@ -66,13 +66,20 @@ export class Scenery {
     scene.fog = new FogExp2(0xffffff, HAZE);
     const { shadow } = this.#sun;
     shadow.mapSize.set(2048, 2048);
-    Object.assign(shadow.camera, { left: -SHADOWS, right: SHADOWS, top: SHADOWS, bottom: -SHADOWS, near: 1, far: 40 });
+    this.setShadows(SHADOWS);
     shadow.radius = 4;
     shadow.bias = -0.0004;
     shadow.normalBias = 0.015;
     this.#rim.position.copy(RIM);
     this.#all.add(this.#ground, this.#sky, this.#sun, this.#sun.target, this.#rim, this.#ambient);
     scene.add(this.#all);
+  }
+
+  /** Sets half the side of the area with shadows, m. A larger one has coarser shadows. */
+  setShadows(half = SHADOWS): void {
+    const { camera } = this.#sun.shadow;
+    Object.assign(camera, { left: -half, right: half, top: half, bottom: -half, near: 1, far: 40 });
+    camera.updateProjectionMatrix();
   }
 
   /** Without level ground, the floor lies deep below the figures. */

@@ -6,7 +6,7 @@ import { DAY, DUSK } from "./colors";
 import { type Level, QualityControl, fixedLevel, pixelRatio, rendersInSoftware } from "./quality";
 import { Scenery } from "./scenery";
 
-/** What a view does in a frame. */
+/** A view's part in each frame. */
 export interface Actor {
   /** Advances by seconds of real time. Returns the point to look at. */
   frame(dt: number): Vector3 | null;
@@ -75,6 +75,7 @@ export class Stage {
     this.show(null);
     this.world.clear();
     this.scenery.setLevel(true);
+    this.scenery.setShadows();
   }
 
   /** The picture as a PNG file. */
