@@ -18,6 +18,7 @@ export default defineConfig({
     preload("src/app/shell.ts"),
     offline(here("public"), here("build/sw.js")),
   ],
+  resolve: { alias: { "node:fs/promises": here("build/no-files.ts") } },
   build: { target: "es2022", assetsInlineLimit: 0, modulePreload: { polyfill: false } },
   worker: { format: "es" },
   // the package finds its modules by the folder that the page passes
