@@ -4,13 +4,15 @@
 #   fuzz      every reader for ten minutes of processor time (fuzz/run.py)
 #   release   wheels, programs and archives of all platforms that this system can build, tried as a user would
 #   aarch64   the Python tests with the wheel for Arm, under qemu
+#   bits      states and weights with SSE2, under qemu with NEON, and with both WebAssembly modules
+#   web       the page in Chromium and Firefox, with five minutes of play
 #   crates    packs and compiles the published crates
 #   player    twenty random players in the game, and four with a camera in each of five worlds, ten minutes of its time each
 set -euo pipefail
 cd "$(dirname "$0")/.."
 parts=("$@")
 if [ $# = 0 ]; then
-  parts=(fuzz release aarch64 crates player)
+  parts=(fuzz release aarch64 bits web crates player)
 fi
 for part in "${parts[@]}"; do
   echo "tests/long.sh: $part" >&2
@@ -24,11 +26,20 @@ for part in "${parts[@]}"; do
       release/build.sh wheel-aarch64
       tests/aarch64.sh release/dist/marathon_rl-*manylinux*aarch64*.whl
       ;;
+    bits)
+      cargo test --release -p marathon-wasm --features baseline --test bits
+      rustup --quiet target add aarch64-unknown-linux-musl
+      CARGO_TARGET_AARCH64_UNKNOWN_LINUX_MUSL_LINKER=rust-lld \
+        CARGO_TARGET_AARCH64_UNKNOWN_LINUX_MUSL_RUNNER=qemu-aarch64-static RUSTFLAGS='-C link-self-contained=yes' \
+        cargo test --release -p marathon-wasm --test bits --target aarch64-unknown-linux-musl
+      crates/wasm/test.sh --both
+      ;;
+    web) web/test.sh --long ;;
     crates) release/publish.sh --dry-run ;;
     player)
       cargo test --release --workspace --test a_stranger_plays -- --ignored --nocapture
       MARATHON_TEST_LONG=yes cargo test --release --workspace --test the_camera_stays_outside -- --nocapture
       ;;
-    *) echo "tests/long.sh: no part '$part'; there are fuzz, release, aarch64, crates and player" >&2 && exit 2 ;;
+    *) echo "tests/long.sh: no part '$part'; there are fuzz, release, aarch64, bits, web, crates and player" >&2 && exit 2 ;;
   esac
 done

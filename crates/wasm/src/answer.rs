@@ -92,7 +92,7 @@ impl Failure {
         Failure { missing, ..self }
     }
 
-    /// What JavaScript reads.
+    /// The JSON that JavaScript reads.
     pub fn to_json(&self) -> Vec<u8> {
         json!({ "message": self.message, "missing": self.missing }).to_string().into_bytes()
     }

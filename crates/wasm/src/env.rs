@@ -429,7 +429,7 @@ pub extern "C" fn agents() -> i32 {
     respond(|_| Answer::json(&marathon_envs::ids()))
 }
 
-/// What the file `policy` says about itself.
+/// The description in the file `policy`.
 #[unsafe(no_mangle)]
 pub extern "C" fn policy_info() -> i32 {
     respond(|mut request| {

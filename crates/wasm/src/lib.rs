@@ -2,8 +2,8 @@
 //! clips.
 //!
 //! The interface consists of plain functions over numbers, and two buffers. JavaScript writes a request into the
-//! [input](abi::input) buffer: the length of a JSON text, the text, then files. The answer, or the message of an error, is in
-//! the [output](abi::output) buffer. Functions that can fail return a negative number then. Objects are numbered; each has
+//! `input` buffer: the length of a JSON text, the text, then files. The answer, or the message of an error, is in
+//! the `output` buffer. Functions that can fail return a negative number then. Objects are numbered; each has
 //! functions that return the places of its arrays in memory. `npm/src` wraps all this in classes.
 //!
 //! The module imports nothing and has one thread. A worker has its own instance.

@@ -5,7 +5,7 @@ use marathon_physics::Model;
 use marathon_physics::model::GeomType;
 use serde_json::{Value, json};
 
-/// What a page needs to know about a model.
+/// Facts of a model for pages.
 pub fn model(model: &Model) -> Value {
     let actuators = model.actuators.iter().map(|actuator| {
         let [low, high] = if actuator.ctrl_limited { actuator.ctrl_range } else { [-1.0, 1.0] };
@@ -36,7 +36,7 @@ pub fn model(model: &Model) -> Value {
     })
 }
 
-/// What a page needs to know about a task.
+/// Facts of a task for pages.
 pub fn spec(spec: &Spec) -> Value {
     let command = spec
         .command

@@ -7,7 +7,7 @@ export class Clip extends Handle {
   readonly info: ClipInfo;
   /** The character. */
   readonly model: ModelInfo;
-  /** What may be wrong with the motion, one sentence each. */
+  /** Warnings about the motion, one sentence each. */
   readonly warnings: readonly string[];
 
   /** @internal Use `Marathon.importMotion`. */

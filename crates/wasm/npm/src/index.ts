@@ -68,7 +68,7 @@ export class Marathon {
     return Trainer.create(this.#bridge, agent, config);
   }
 
-  /** What a policy file says about itself. */
+  /** Reads the description in a policy file. */
   policyInfo(policy: Uint8Array): PolicyInfo {
     this.#bridge.call((exports) => exports.policy_info(), {}, { policy });
     return this.#bridge.json<PolicyInfo>();

@@ -1,4 +1,4 @@
-/** What a command number means, and its range. */
+/** Name and range of a number of the command. */
 export interface CommandRange {
   readonly name: string;
   readonly low: number;
@@ -43,7 +43,7 @@ export interface Field {
   readonly pos: readonly [number, number, number];
 }
 
-/** What a model consists of. */
+/** The parts of a model. */
 export interface ModelInfo {
   readonly nq: number;
   readonly nv: number;
@@ -87,7 +87,7 @@ export interface EnvOptions {
   readonly seed?: number;
   /** Options of the task. */
   readonly options?: Readonly<Record<string, OptionValue>>;
-  /** What happens at the end of an episode: a new one starts at once, or nothing. Default `same_step`. */
+  /** At the end of an episode, a new one starts at once, or the agent stays as it is. Default `same_step`. */
   readonly autoreset?: "same_step" | "disabled";
   /** Decisions after which an episode is truncated; 0 for no end by time. Default: the task's. */
   readonly max_episode_steps?: number;
@@ -99,7 +99,7 @@ export interface EnvOptions {
   readonly clip?: Uint8Array;
 }
 
-/** What a step returns, one entry per agent. The arrays are views of the module's memory until the next call. */
+/** Results of a step, one entry per agent. The arrays are views of the module's memory until the next call. */
 export interface Step {
   /** `[agent][obs]` */
   readonly obs: Float32Array;
@@ -136,7 +136,7 @@ export interface Iteration {
   readonly fall_fraction: number | null;
 }
 
-/** What a file of a policy says about itself. */
+/** Description of a policy. */
 export interface PolicyInfo {
   /** Task that it was trained for. */
   readonly agent: string;
