@@ -169,6 +169,42 @@ test("a limb can be pulled with the mouse", { skip }, async () => {
   await close();
 });
 
+test("skins fit the bodies", { skip }, async () => {
+  for (const agent of ["MarathonMan", "Walker", "Ant", "Hopper"]) {
+    const { page, errors, close } = await visit(`#/play?agent=${agent}`, "play");
+    await page.waitForFunction(() => window.marathonPage.stage.world.children.some((child) => child.isSkinnedMesh), undefined, { timeout: 20_000 });
+    await page.waitForTimeout(1500);
+    await page.keyboard.press("Enter");
+    await page.waitForTimeout(400);
+    const farthest = await page.evaluate(() => {
+      const { stage, view } = window.marathonPage;
+      const { env } = view.player.arena;
+      const mesh = stage.world.children.find((child) => child.isSkinnedMesh);
+      const poses = env.poses();
+      const rods = env.model.geoms.flatMap(({ kind, size }, i) => {
+        if (kind !== "capsule" && kind !== "sphere") return [];
+        const [x, y, z, , px, py, pz] = poses.subarray(16 * i + 8, 16 * i + 15);
+        return [{ at: [px, py, pz], axis: [x, y, z], half: kind === "capsule" ? size[1] : 0, radius: size[0] }];
+      });
+      const distance = (point, { at, axis, half, radius }) => {
+        const d = point.map((x, k) => x - at[k]);
+        const along = Math.max(-half, Math.min(half, d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2]));
+        return Math.hypot(...d.map((x, k) => x - along * axis[k])) - radius;
+      };
+      let most = 0;
+      const vertex = stage.follow.focus.clone();
+      for (let i = 0; i < mesh.geometry.getAttribute("position").count; i += 20) {
+        mesh.getVertexPosition(i, vertex);
+        most = Math.max(most, Math.min(...rods.map((rod) => distance(vertex.toArray(), rod))));
+      }
+      return most;
+    });
+    assert.ok(farthest < 0.12, `a point of ${agent}'s skin is ${farthest.toFixed(3)} m from its shapes`);
+    assert.deepEqual(errors, []);
+    await close();
+  }
+});
+
 test("a hopper improves while it learns", { skip }, async (t) => {
   const { page, errors, close } = await visit("#/learn?agent=hopper&start=1", "learn");
   const progress = () => page.evaluate(() => window.marathonPage.view.progress);

@@ -1,14 +1,14 @@
 /**
- * Skins: a smooth surface around the geoms, whose bones have the names and places of the bodies (`marathon skin`). The loader of
- * glTF files is large, so it is loaded after the first picture.
+ * Skins: surfaces whose bones are fixed to bodies, by their names or by `extras.body` (skins/make.mjs). The loader of glTF files is
+ * large, so it is loaded after the first picture.
  */
 import { Bone, Matrix4, Mesh, MeshLambertMaterial, MeshStandardMaterial, Skeleton, SkinnedMesh } from "three";
 import type { ModelInfo } from "marathon-rl";
 import { pageUrl } from "../app/engine";
 import type { Level } from "./quality";
 
-/** From the axes of a glTF file, y up, to those of the physics. */
-const AXES = new Matrix4().set(1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1);
+/** From the axes of a glTF file, y up and z ahead, to those of the physics, z up and x ahead. */
+const AXES = new Matrix4().set(0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1);
 
 interface Follower {
   readonly bone: Bone;
@@ -36,9 +36,9 @@ export class Skin {
     if (source === null) return null;
     const { skeleton, geometry } = source as SkinnedMesh;
     // bones of its own outside the scene: bodies place them, not their parents
-    const bones = skeleton.bones.map(({ name: bone }) => {
+    const bones = skeleton.bones.map(({ name: bone, userData }) => {
       const own = new Bone();
-      own.name = bone;
+      own.name = String(userData["body"] ?? bone);
       own.matrixWorldAutoUpdate = false;
       return own;
     });
