@@ -169,6 +169,7 @@ class Shell {
       this.#handle.view = view;
       this.#handle.name = route.view;
       document.documentElement.dataset["ready"] = route.view;
+      performance.mark("marathon-ready");
     } catch (error) {
       if (gone()) return;
       this.#overlay.replaceChildren();

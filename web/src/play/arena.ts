@@ -13,7 +13,8 @@ export interface ArenaOptions {
   readonly agent: string;
   readonly options: EnvOptions;
   readonly distance: number;
-  readonly skin: string | null;
+  /** Name of the skin, or how it follows from the names of the bodies. */
+  readonly skin: string | null | ((bodies: readonly string[]) => string | null);
   /** Reads the devices, once per frame. */
   readonly read: () => Deflection;
   /** The module failed in a step. */
@@ -62,7 +63,8 @@ export class Arena implements Actor {
     this.#layGround();
     stage.follow.set(this.#free ? "chase" : "side", distance, this.#heading());
     stage.canvas.dataset["agent"] = spec.id;
-    if (skin !== null) void this.puppet.wear(skin);
+    const name = typeof skin === "function" ? skin(model.bodies.map((body) => body.name)) : skin;
+    if (name !== null) void this.puppet.wear(name);
   }
 
   /** Level velocity of the center of mass, m/s. */

@@ -7,7 +7,7 @@ import { Gamepads } from "../input/gamepad";
 import { KEYS, Keyboard } from "../input/keyboard";
 import { PointerControl } from "../input/pointer";
 import { TouchControls } from "../input/touch";
-import { Arena } from "./arena";
+import { Arena, type ArenaOptions } from "./arena";
 
 /** Speeds of time that keys choose. */
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2] as const;
@@ -17,7 +17,7 @@ export interface PlayerOptions {
   readonly agent: string;
   readonly env: EnvOptions;
   readonly distance: number;
-  readonly skin: string | null;
+  readonly skin: ArenaOptions["skin"];
   /** Goes to the next character, where there is one. */
   readonly next?: () => void;
 }

@@ -62,10 +62,7 @@ class Policies implements View {
   #play(agent: string, policy: Uint8Array): void {
     const options = optionsOf(this.#context.params);
     const env = Object.keys(options).length > 0 ? { policy, options } : { policy };
-    const probe = this.#context.marathon.env(agent, env);
-    const bodies = probe.model.bodies.map(({ name }) => name);
-    probe.free();
-    this.#player = new Player(this.#context, { agent, env, distance: 4.8, skin: skinOf(bodies) });
+    this.#player = new Player(this.#context, { agent, env, distance: 4.8, skin: skinOf });
   }
 
   #fill(): void {

@@ -70,7 +70,7 @@ export function fixedLevel(params: URLSearchParams): Level | null {
 /** Whether a processor renders in place of a graphics card. */
 export function rendersInSoftware(): boolean {
   const context = document.createElement("canvas").getContext("webgl2");
-  if (context === null) return true;
+  if (context === null) throw new Error("this browser has no WebGL 2, which draws the picture");
   const info = context.getExtension("WEBGL_debug_renderer_info");
   const name = String(context.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : context.RENDERER));
   context.getExtension("WEBGL_lose_context")?.loseContext();
