@@ -275,8 +275,9 @@ test("models, recordings and policies can be dropped", { skip }, async () => {
   await ready(page, "models");
   assert.equal(await heading(), "robot.xml");
   assert.equal(await page.getByRole("slider").count(), 1);
-  await drop(page, [["wave.bvh", bvh()]]);
+  await drop(page, [["wave.bvh", bvh(12)]]);
   await page.waitForFunction(() => document.querySelector(".panel h3")?.textContent === "wave.bvh");
+  await page.getByRole("slider", { name: "Time" }).waitFor({ timeout: 60_000 });
   assert.equal(await page.locator(".message").isVisible(), false);
   await drop(page, [["mine.safetensors", await policy("walker2d")]]);
   await page.waitForFunction(() => document.querySelector(".panel h3")?.textContent === "mine.safetensors");

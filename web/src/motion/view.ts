@@ -8,6 +8,7 @@ import { Keyboard } from "../input/keyboard";
 import { PointerControl } from "../input/pointer";
 import { Player } from "../play/player";
 import { ClipPlayer } from "./clip";
+import { type Import, startImport } from "./import";
 import { CLIPS } from "./samples";
 
 const CHARACTER = "MarathonMan";
@@ -20,10 +21,12 @@ const RECORDING = /^(bvh|glb|gltf|vrm|vrma|motion)$/;
 
 class Motion implements View {
   readonly #context: Context;
+  readonly #main = el("div", { class: "stack" });
   #player: ClipPlayer | null = null;
   #follower: Player | null = null;
   #pointer: PointerControl | null = null;
   #keyboard: Keyboard | null = null;
+  #import: Import | null = null;
 
   constructor(context: Context) {
     this.#context = context;
@@ -32,21 +35,26 @@ class Motion implements View {
 
   async show(): Promise<void> {
     const { panel, stay, fail } = this.#context;
-    panel.replaceChildren(el("h2", {}, "Motion"));
+    panel.replaceChildren(el("h2", {}, "Motion"), this.#main);
+    this.#fill();
     try {
       const [recording, files] = await this.#find();
       stay();
-      const clip = this.#read(recording, files);
-      this.#play(clip);
-      panel.append(this.#about(clip, baseName(recording.path)));
+      if (extension(recording.path) === "motion") this.#show(recording.path, recording.bytes, []);
+      else void this.#read(recording, files);
     } catch (error) {
       stay();
       fail(error);
     }
-    this.#fill();
+  }
+
+  /** Whether a recording is being imported. */
+  get busy(): boolean {
+    return this.#import !== null;
   }
 
   dispose(): void {
+    this.#import?.stop();
     this.#keyboard?.dispose();
     this.#pointer?.dispose();
     this.#follower?.dispose();
@@ -64,9 +72,30 @@ class Motion implements View {
     return [{ path: baseName(url.pathname), bytes: await fetchBytes(url, MOST) }, []];
   }
 
-  #read({ path, bytes }: GivenFile, files: readonly GivenFile[]): Clip {
+  /** Imports a recording, and shows the clip when it is there. */
+  async #read({ path, bytes }: GivenFile, files: readonly GivenFile[]): Promise<void> {
+    const { marathon, stay, fail } = this.#context;
+    const name = baseName(path);
     const beside = Object.fromEntries(files.filter((file) => file.path !== path).map((file) => [baseName(file.path), file.bytes]));
-    return this.#context.marathon.importMotion(CHARACTER, baseName(path), bytes, beside);
+    this.#main.replaceChildren(el("h3", {}, name), el("p", { role: "status", class: "notice" }, "Fitting the motion to Marathon Man. A long recording takes minutes."));
+    try {
+      this.#import = startImport(marathon, { character: CHARACTER, name, bytes, files: beside });
+      const { motion, warnings } = await this.#import.result;
+      stay();
+      this.#show(name, motion, warnings);
+    } catch (error) {
+      this.#main.replaceChildren();
+      fail(error);
+    } finally {
+      this.#import = null;
+    }
+  }
+
+  #show(path: string, motion: Uint8Array, warnings: readonly string[]): void {
+    const name = baseName(path);
+    const clip = this.#context.marathon.importMotion(CHARACTER, name.replace(/\.[^.]*$/, ".motion"), motion);
+    this.#play(clip);
+    this.#main.replaceChildren(this.#about(clip, name, warnings));
   }
 
   #play(clip: Clip): void {
@@ -77,7 +106,7 @@ class Motion implements View {
     stage.show(this.#player);
   }
 
-  #about(clip: Clip, file: string): HTMLElement {
+  #about(clip: Clip, file: string, problems: readonly string[]): HTMLElement {
     const { name, duration, frames, loop } = clip.info;
     const player = this.#player;
     const scrub = slider({
@@ -105,7 +134,7 @@ class Motion implements View {
       if (action === "pause") pause.click();
     });
     const warnings = el("ul", { class: "list" });
-    for (const warning of clip.warnings) warnings.append(el("li", {}, warning));
+    for (const warning of problems) warnings.append(el("li", {}, warning));
     const save = (): void => download(`${name || "clip"}.motion`, clip.bytes());
     return el(
       "div",
@@ -114,8 +143,8 @@ class Motion implements View {
       el("p", {}, `${duration.toFixed(2)} s, ${frames} frames${loop ? ", a cycle" : ""}`),
       el("div", { class: "row" }, pause, slow, button("Download .motion", save), button("Follow it", () => void this.#follow(clip.bytes()), { title: "A policy follows the clip in the simulation" })),
       scrub,
-      clip.warnings.length > 0 && el("h3", {}, clip.warnings.length === 1 ? "One warning" : `${clip.warnings.length} warnings`),
-      clip.warnings.length > 0 && warnings,
+      problems.length > 0 && el("h3", {}, problems.length === 1 ? "One warning" : `${problems.length} warnings`),
+      problems.length > 0 && warnings,
     );
   }
 
