@@ -63,24 +63,30 @@ export interface Slider {
 
 export function slider({ label, low, high, value, step, show, onInput }: Slider): HTMLLabelElement & { set(value: number): void } {
   const text = show ?? ((x: number) => x.toFixed(2));
-  const output = el("output", {}, text(value));
+  const output = el("span", { class: "value" }, text(value));
   const input = el("input", {
     type: "range",
+    "aria-label": label,
     min: low,
     max: high,
     step: step ?? (high - low) / 200,
     value,
     input: () => {
-      output.textContent = text(input.valueAsNumber);
+      setText(input.valueAsNumber);
       onInput(input.valueAsNumber);
     },
   });
+  const setText = (now: number): void => {
+    output.textContent = text(now);
+    input.setAttribute("aria-valuetext", text(now));
+  };
+  setText(value);
   const made = el("label", { class: "slider" }, el("span", {}, label), output, input) as HTMLLabelElement & {
     set(value: number): void;
   };
   made.set = (now) => {
     input.value = String(now);
-    output.textContent = text(now);
+    setText(now);
   };
   return made;
 }
