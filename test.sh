@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Tests everything but the game, the packing of the wheel, and whether the fuzzers and the core for browsers compile. `./test.sh
+# Tests everything but the game, the packing of the wheel, the npm package and the page, and whether the fuzzers compile. `./test.sh
 # --all` tests those as well, and compiles Bevy once. `./test.sh --long` adds what takes hours: tests/long.sh lists it.
 #
 # Sets up by itself what the tests need: Python environments with the oracles (MuJoCo, Gymnasium, dm_control, PyTorch) in
@@ -35,6 +35,8 @@ cargo fmt --all --check
 if [ -n "$game" ]; then
   tests/types.sh
   tests/lanes/run.sh
+  crates/wasm/test.sh
+  web/test.sh --quick
 fi
 # lints and checks documentation while it compiles
 export RUSTC_WORKSPACE_WRAPPER="$PWD/tests/lint.sh"
