@@ -2,6 +2,7 @@
 
 mod capped;
 mod contacts;
+mod dof;
 mod forces;
 mod motion;
 mod readings;
@@ -10,6 +11,7 @@ mod solver;
 
 pub(crate) use capped::Capped;
 pub(crate) use contacts::GeomContacts;
+pub(crate) use dof::DofWork;
 pub(crate) use forces::Forces;
 pub(crate) use motion::Motion;
 pub(crate) use readings::Measured;
@@ -26,6 +28,8 @@ use crate::sim::Sim;
 #[derive(Clone, Debug)]
 pub struct Work<T: Real> {
     pub(crate) motion: Motion<T>,
+    /// Per degree of freedom.
+    pub(crate) dofs: Vec<DofWork<T>>,
     pub(crate) forces: Forces<T>,
     pub(crate) solver: Solver<T>,
     pub(crate) contacts: GeomContacts<T>,
@@ -48,6 +52,7 @@ impl<T: Real> Work<T> {
     pub fn new(sim: &Sim<T>) -> Self {
         Work {
             motion: Motion::new(sim),
+            dofs: vec![DofWork::new(); sim.model.nv],
             forces: Forces::new(sim),
             solver: Solver::new(sim),
             contacts: GeomContacts::new(sim),
