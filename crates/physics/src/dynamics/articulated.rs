@@ -29,14 +29,14 @@ pub(crate) fn factorize<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, wit
     let (stale, in_contact, inertia) = (&mut stale[..n], &in_contact[..n], &motion.inertia[..n]);
     let (stiffness, wrench) = (&stiffness[..n], &wrench[..n]);
     let (art, art_force) = (&mut art[..n], &mut art_force[..n]);
-    let applied = forces.acts_on_links();
+    let (bias_force, applied) = (&motion.bias_force[..n], &forces.link_applied[..]);
     for l in (0..n).rev() {
         if !stale[l] {
             continue;
         }
         let link = &links[l];
         let mut k: Sym6<T> = sym6_of_inertia(&inertia[l]);
-        let mut f: V6<T> = net_bias_force(motion, forces, applied, l);
+        let mut f: V6<T> = net_bias_force(bias_force, applied, l);
         if in_contact[l] {
             if with_stiffness {
                 S::add_sym(&mut k, &stiffness[l]);

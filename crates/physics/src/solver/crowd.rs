@@ -164,14 +164,13 @@ kernel_fn! {
         let bits = T::bits(lanes);
         for lane in (0..T::LANES).filter(|lane| bits >> lane & 1 == 1) {
             let Work { motion, dofs, forces, solver, .. } = work;
-            let applied = forces.acts_on_links();
             let Solver { crowds, in_contact, wrench, link_force, solution, link_acc, .. } = solver;
             let Crowd { plan, numbers } = &mut crowds[lane];
             for (to, from) in numbers.rhs.iter_mut().zip(dofs.iter()) {
                 *to = from.rhs.get(lane);
             }
             for l in 0..sim.links.len() {
-                let from = if residual { link_force[l] } else { net_bias_force(motion, forces, applied, l) };
+                let from = if residual { link_force[l] } else { net_bias_force(&motion.bias_force, &forces.link_applied, l) };
                 numbers.force[l] = from.map(|x| x.get(lane));
                 if !residual && in_contact[l] {
                     for (f, w) in numbers.force[l].iter_mut().zip(&wrench[l]) {

@@ -159,22 +159,19 @@ fn warm_start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
 #[inline(always)]
 pub(super) fn assemble<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     let z = T::zero();
-    let links = &sim.links[..];
-    let n = links.len();
+    let n = sim.links.len();
     let Work { rows, solver, dofs, forces, .. } = work;
     let (stale, in_contact) = (&solver.stale[..n], &solver.in_contact[..n]);
     let (stiffness, wrench) = (&mut solver.stiffness[..n], &mut solver.wrench[..n]);
-    for (l, link) in links.iter().enumerate() {
-        if !stale[l] {
-            continue;
-        }
-        let at = link.dofs.clone();
-        let constants = sim.armature[at.clone()].iter().zip(&forces.qfrc_passive_actuator[at.clone()]);
-        for (dof, (armature, force)) in dofs[at].iter_mut().zip(constants) {
-            (dof.diag, dof.rhs) = (T::splat(*armature), *force);
-        }
-        if in_contact[l] {
+    for l in 0..n {
+        if stale[l] && in_contact[l] {
             (stiffness[l], wrench[l]) = ([z; 21], [z; 6]);
+        }
+    }
+    let joints = sim.dof_link.iter().zip(&sim.armature).zip(&forces.qfrc_passive_actuator);
+    for (dof, ((link, armature), force)) in dofs.iter_mut().zip(joints) {
+        if stale[*link] {
+            (dof.diag, dof.rhs) = (T::splat(*armature), *force);
         }
     }
     for c in rows.contacts.iter().filter(|c| stale[c.link]) {
@@ -268,12 +265,12 @@ fn refine<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, arrived: T::Mask,
     link_accelerations::<T, S>(sim, work);
     let n = sim.links.len();
     let Work { motion, forces, solver, .. } = work;
-    let applied = forces.acts_on_links();
     let (inertia, link_acc, wrench) = (&motion.inertia[..n], &solver.link_acc[..n], &solver.wrench[..n]);
+    let (bias_force, applied) = (&motion.bias_force[..n], &forces.link_applied[..]);
     let (in_contact, link_force) = (&solver.in_contact[..n], &mut solver.link_force[..n]);
     for l in 0..n {
         let mut f = S::momentum(&inertia[l], &link_acc[l]);
-        S::add(&mut f, &net_bias_force(motion, forces, applied, l));
+        S::add(&mut f, &net_bias_force(bias_force, applied, l));
         if in_contact[l] {
             S::sub(&mut f, &wrench[l]);
         }

@@ -97,7 +97,7 @@ fn gyroscope<T: Real>(sim: &Sim<T>, work: &mut Work<T>, l: usize) {
     // symmetric, so rows are columns
     let inertia = [[jxx, jxy, jxz], [jxy, jyy, jyz], [jxz, jyz, jzz]];
     let spin = rotate(&inertia, &w);
-    let mut wrench = net_bias_force(&work.motion, &work.forces, work.forces.acts_on_links(), l);
+    let mut wrench = net_bias_force(&work.motion.bias_force, &work.forces.link_applied, l);
     if work.solver.in_contact[l] {
         for i in 0..6 {
             wrench[i] -= work.solver.wrench[l][i];

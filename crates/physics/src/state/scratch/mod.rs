@@ -82,14 +82,13 @@ impl<T: Real> Work<T> {
 }
 
 /// The part of a link's bias force that remains for joints and constraints after external forces on the link: gravity
-/// compensation, fluid and pushes. `applied` says whether there are such forces ([`Forces::acts_on_links`]), so that it
-/// is checked once instead of per link.
+/// compensation, fluid and pushes. `applied` has these forces, and is empty if there are none.
 #[inline(always)]
-pub(crate) fn net_bias_force<T: Real>(motion: &Motion<T>, forces: &Forces<T>, applied: bool, link: usize) -> V6<T> {
-    let mut f = motion.bias_force[link];
-    if applied {
+pub(crate) fn net_bias_force<T: Real>(bias_force: &[V6<T>], applied: &[V6<T>], link: usize) -> V6<T> {
+    let mut f = bias_force[link];
+    if let Some(applied) = applied.get(link) {
         for i in 0..6 {
-            f[i] -= forces.link_applied[link][i];
+            f[i] -= applied[i];
         }
     }
     f
