@@ -200,9 +200,9 @@ fn inward<T: Real, S: Space>(
         let (dofs, rhs) = (&work.dofs[link.dofs.clone()], &rhs[link.dofs.clone()]);
         let out = &mut out[link.dofs.clone()];
         if link.free_block {
-            if let (Ok(dofs), Ok(rhs)) = (dofs.try_into(), rhs.try_into()) {
-                out.copy_from_slice(&reduce_free_root(&work.solver.root_factor[link.tree], dofs, rhs, &f));
-            }
+            let six = "a free joint has six degrees of freedom";
+            let (dofs, rhs) = (dofs.try_into().expect(six), rhs.try_into().expect(six));
+            out.copy_from_slice(&reduce_free_root(&work.solver.root_factor[link.tree], dofs, rhs, &f));
             continue;
         }
         for ((dof, rhs), out) in dofs.iter().zip(rhs).zip(out).rev() {
