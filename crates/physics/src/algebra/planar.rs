@@ -26,6 +26,10 @@ pub(crate) trait Space: Copy + Send + Sync + 'static {
     fn scale<T: Real>(s: &V6<T>, x: T) -> V6<T>;
     /// `k -= u v'` for `v` proportional to `u`.
     fn sub_outer<T: Real>(k: &mut Sym6<T>, u: &V6<T>, v: &V6<T>);
+    /// Copies the used components.
+    fn copy<T: Real>(to: &mut V6<T>, from: &V6<T>);
+    /// Copies the used entries of a symmetric matrix.
+    fn copy_sym<T: Real>(to: &mut Sym6<T>, from: &Sym6<T>);
     /// Momentum of a rigid body.
     fn momentum<T: Real>(i: &Inertia<T>, v: &V6<T>) -> V6<T>;
 }
@@ -78,11 +82,21 @@ impl Space for Full {
         sym6_sub_outer(k, u, v);
     }
     #[inline(always)]
+    fn copy<T: Real>(to: &mut V6<T>, from: &V6<T>) {
+        *to = *from;
+    }
+    #[inline(always)]
+    fn copy_sym<T: Real>(to: &mut Sym6<T>, from: &Sym6<T>) {
+        *to = *from;
+    }
+    #[inline(always)]
     fn momentum<T: Real>(i: &Inertia<T>, v: &V6<T>) -> V6<T> {
         inertia_mul(i, v)
     }
 }
 
+/// Planar components: rotation about y, translation along x and z.
+const COMPONENTS: [usize; 3] = [1, 3, 5];
 /// Entries of a [`Sym6`] that couple the planar components: (y, y), (y, x), (y, z), (x, x), (z, z), (x, z).
 const ENTRIES: [usize; 6] = [1, 9, 11, 15, 17, 19];
 
@@ -139,6 +153,18 @@ impl Space for Planar {
         k[15] = u[3].neg_mul_add(v[3], k[15]);
         k[17] = u[5].neg_mul_add(v[5], k[17]);
         k[19] = u[3].neg_mul_add(v[5], k[19]);
+    }
+    #[inline(always)]
+    fn copy<T: Real>(to: &mut V6<T>, from: &V6<T>) {
+        for i in COMPONENTS {
+            to[i] = from[i];
+        }
+    }
+    #[inline(always)]
+    fn copy_sym<T: Real>(to: &mut Sym6<T>, from: &Sym6<T>) {
+        for i in ENTRIES {
+            to[i] = from[i];
+        }
     }
     #[inline(always)]
     fn momentum<T: Real>(i: &Inertia<T>, v: &V6<T>) -> V6<T> {

@@ -12,14 +12,16 @@ use crate::state::{Group, Work};
 #[inline(always)]
 pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     let zero = T::zero();
-    work.contacts.touching.fill(T::none());
-    work.contacts.ground_contacts.fill(zero);
+    let Work { motion, contacts, rows, past, stats, .. } = work;
+    let (rots, places, vels) = (&motion.rot[..], &motion.pos[..], &motion.vel[..]);
+    let (references, links) = (&motion.reference[..], &sim.links[..]);
+    contacts.touching.fill(T::none());
+    contacts.ground_contacts.fill(zero);
     // per lane, corners of the current box that are already in contact
     let mut corners = zero;
-    let mut past = 0;
+    let mut at = 0;
     for (candidate, c) in sim.contacts.floor.iter().enumerate() {
-        let tree = sim.links[c.link].tree;
-        let (rot, pos, reference) = (&work.motion.rot[c.link], &work.motion.pos[c.link], &work.motion.reference[tree]);
+        let (rot, pos, reference) = (&rots[c.link], &places[c.link], &references[links[c.link].tree]);
         let p: V3<T> = splat3(&c.point);
         let base = pos[2] + (reference[2] - T::splat(c.height));
         let height = rot[0][2].mul_add(p[0], rot[1][2].mul_add(p[1], rot[2][2].mul_add(p[2], base)));
@@ -39,8 +41,8 @@ pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
         if !T::any(on) {
             continue;
         }
-        work.stats.contacts += T::bits(on).count_ones() as u64;
-        work.stats.contact_rows += 1;
+        stats.contacts += T::bits(on).count_ones() as u64;
+        stats.contact_rows += 1;
         let x = rot[0][0].mul_add(p[0], rot[1][0].mul_add(p[1], rot[2][0].mul_add(p[2], pos[0])));
         let y = rot[0][1].mul_add(p[0], rot[1][1].mul_add(p[1], rot[2][1].mul_add(p[2], pos[1])));
         // the contact point lies midway between the two surfaces
@@ -56,20 +58,20 @@ pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
             }
             mu = [mu[0] * factor, mu[1] * factor];
         }
-        let vel = &work.motion.vel[c.link];
+        let vel = &vels[c.link];
         let v = cross_add(&ang(vel), &r, &lin(vel));
         let (v1, v2) = (v[0].mul_add(tx, v[1] * ty), v[1].mul_add(tx, -(v[0] * ty)));
         let b = T::splat(c.soft.b);
         let u0 = [v[2].mul_add(b, imp * violation * T::splat(c.soft.k)), v1 * b, v2 * b];
         let mut active = [T::none(); 4];
         let mut recalled = T::none();
-        if let Some(row) = former(&work.past.contacts, &mut past, candidate, |row| row.candidate) {
+        if let Some(row) = former(&past.contacts, &mut at, candidate, |row| row.candidate) {
             recalled = T::and(on, row.on);
             for k in 0..4 {
                 active[k] = T::and(recalled, row.active[k]);
             }
         }
-        work.rows.contacts.push(FloorRow {
+        rows.contacts.push(FloorRow {
             link: c.link,
             candidate,
             geom: c.geom,
@@ -87,7 +89,7 @@ pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
             on,
             recalled,
         });
-        work.contacts.touch_ground(c.geom, on);
+        contacts.touch_ground(c.geom, on);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::lanes::Real;
 use crate::rows::{DryRow, LimitRow, former};
-use crate::sim::{Sim, Softness, impedance};
+use crate::sim::{LimitSpec, Sim, impedance};
 use crate::state::{Group, Work};
 
 /// Writes the rows of violated joint limits and of dry friction.
@@ -16,13 +16,13 @@ pub(crate) fn joint_rows<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Wor
         let high = (T::splat(limit.high[0]) - q) + T::splat(limit.high[1]);
         let [first, second] = [2 * i, 2 * i + 1];
         if limit.two_sided {
-            push_limit((limit.dof, first), low, one, &limit.soft, group, work, &mut past);
-            push_limit((limit.dof, second), high, -one, &limit.soft, group, work, &mut past);
+            push_limit(limit, first, low, one, group, work, &mut past);
+            push_limit(limit, second, high, -one, group, work, &mut past);
         } else {
             // at most one side is violated: one row serves both
             let lower = low.lt(high);
             let (dist, sign) = (T::select(lower, low, high), T::select(lower, one, -one));
-            push_limit((limit.dof, first), dist, sign, &limit.soft, group, work, &mut past);
+            push_limit(limit, first, dist, sign, group, work, &mut past);
         }
     }
     for (i, dry) in sim.dry.iter().enumerate() {
@@ -35,6 +35,7 @@ pub(crate) fn joint_rows<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Wor
         }
         work.rows.dry.push(DryRow {
             dof: dry.dof,
+            link: dry.link,
             loss: dry.loss,
             d,
             u0,
@@ -48,17 +49,18 @@ pub(crate) fn joint_rows<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Wor
     }
 }
 
-/// Writes the row of joint limit number `number`. `past` advances along the rows of the previous evaluation.
+/// Writes row `number` of the joint limits. `past` advances along the rows of the previous evaluation.
 #[inline(always)]
 fn push_limit<T: Real>(
-    (dof, number): (usize, usize),
+    limit: &LimitSpec<T::Scalar>,
+    number: usize,
     dist: T,
     sign: T,
-    soft: &Softness<T::Scalar>,
     group: &Group<T>,
     work: &mut Work<T>,
     past: &mut usize,
 ) {
+    let (dof, link, soft) = (limit.dof, limit.link, &limit.soft);
     let on = dist.lt(T::splat(soft.margin));
     if !T::any(on) {
         return;
@@ -73,5 +75,5 @@ fn push_limit<T: Real>(
         active = T::and(recalled, row.active);
     }
     let force = T::zero();
-    work.rows.limits.push(LimitRow { dof, number, sign, d, u0, u: u0, next: u0, force, active, on, recalled });
+    work.rows.limits.push(LimitRow { dof, link, number, sign, d, u0, u: u0, next: u0, force, active, on, recalled });
 }

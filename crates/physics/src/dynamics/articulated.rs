@@ -12,127 +12,153 @@ use crate::algebra::planar::Space;
 use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::sim::Sim;
-use crate::state::{Work, net_bias_force};
+use crate::state::{DofWork, Solver, Work, net_bias_force};
 
 /// Factorizes the stale links and propagates their forces inward.
 ///
-/// `M` without armature comes from the links' inertias. `work.solver.diag` is added to its diagonal (armature, limit
+/// `M` without armature comes from the links' inertias. [`DofWork::diag`] is added to its diagonal (armature, limit
 /// stiffness, implicit damping). `with_stiffness` adds the contact stiffness of touching links. Their wrench is applied
 /// in either case.
 #[inline(always)]
 pub(crate) fn factorize<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, with_stiffness: bool) {
-    let applied = work.forces.acts_on_links();
-    for l in (0..sim.links.len()).rev() {
-        if !work.solver.stale[l] {
+    let links = &sim.links[..];
+    let n = links.len();
+    let Work { motion, forces, dofs, solver, .. } = work;
+    let Solver { stale, in_contact, stiffness, wrench, art, art_force, root_factor, .. } = solver;
+    // slices of known length need no check per link
+    let (stale, in_contact, inertia) = (&mut stale[..n], &in_contact[..n], &motion.inertia[..n]);
+    let (stiffness, wrench) = (&stiffness[..n], &wrench[..n]);
+    let (art, art_force) = (&mut art[..n], &mut art_force[..n]);
+    let (bias_force, applied) = (&motion.bias_force[..n], &forces.link_applied[..]);
+    for l in (0..n).rev() {
+        if !stale[l] {
             continue;
         }
-        let link = &sim.links[l];
-        let mut k: Sym6<T> = sym6_of_inertia(&work.motion.inertia[l]);
-        let mut f: V6<T> = net_bias_force(&work.motion, &work.forces, applied, l);
-        if work.solver.in_contact[l] {
+        let link = &links[l];
+        let mut k: Sym6<T> = sym6_of_inertia(&inertia[l]);
+        let mut f: V6<T> = net_bias_force(bias_force, applied, l);
+        if in_contact[l] {
             if with_stiffness {
-                S::add_sym(&mut k, &work.solver.stiffness[l]);
+                S::add_sym(&mut k, &stiffness[l]);
             }
-            S::sub(&mut f, &work.solver.wrench[l]);
+            S::sub(&mut f, &wrench[l]);
         }
         let mut child = link.last_child;
         while let Some(c) = child {
-            S::add_sym(&mut k, &work.solver.art[c]);
-            S::add(&mut f, &work.solver.art_force[c]);
-            child = sim.links[c].sibling;
+            S::add_sym(&mut k, &art[c]);
+            S::add(&mut f, &art_force[c]);
+            child = links[c].sibling;
         }
         if let Some(p) = link.parent {
-            work.solver.stale[p] = true;
+            stale[p] = true;
         }
+        let dofs = &mut dofs[link.dofs.clone()];
         if link.free_block {
-            factor_free_root(link.dofs.start, link.tree, &k, work);
-            drive_free_root(link.dofs.start, link.tree, &f, work);
+            let (root, dofs) = (&mut root_factor[link.tree], six(dofs));
+            *root = factor_free_root(dofs, &k);
+            drive_free_root(root, dofs, &f);
             continue;
         }
-        for d in link.dofs.clone().rev() {
-            let s = work.motion.axis[d];
-            let u = S::mul(&k, &s);
-            let pivot = (S::dot(&s, &u) + work.solver.diag[d]).recip();
-            let force = work.solver.rhs[d] - S::dot(&s, &f);
+        for dof in dofs.iter_mut().rev() {
+            let u = S::mul(&k, &dof.axis);
+            let pivot = (S::dot(&dof.axis, &u) + dof.diag).recip();
+            let force = dof.rhs - S::dot(&dof.axis, &f);
             let v = S::scale(&u, pivot);
             S::sub_outer(&mut k, &u, &v);
             f = S::axpy(&v, force, &f);
-            work.solver.gain[d] = v;
-            work.solver.pivot[d] = pivot;
-            work.solver.drive[d] = force * pivot;
+            S::copy(&mut dof.gain, &v);
+            (dof.pivot, dof.drive) = (pivot, force * pivot);
         }
-        work.solver.art[l] = k;
-        work.solver.art_force[l] = f;
+        S::copy_sym(&mut art[l], &k);
+        S::copy(&mut art_force[l], &f);
     }
 }
 
-/// Propagates other joint forces (`rhs`) and link forces (`link_force`) inward with the existing factors. This is only
-/// the vector half of [`factorize`], at a fraction of its cost.
+/// Propagates other joint forces ([`DofWork::rhs`]) and link forces (`link_force`) inward with the existing factors.
+/// This is only the vector half of [`factorize`], at a fraction of its cost.
 #[inline(always)]
 pub(crate) fn bring_inward<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
-    for l in (0..sim.links.len()).rev() {
-        let link = &sim.links[l];
-        let mut f = work.solver.link_force[l];
+    let links = &sim.links[..];
+    let n = links.len();
+    let Work { dofs, solver, .. } = work;
+    let (link_force, art_force) = (&solver.link_force[..n], &mut solver.art_force[..n]);
+    for l in (0..n).rev() {
+        let link = &links[l];
+        let mut f = link_force[l];
         let mut child = link.last_child;
         while let Some(c) = child {
-            S::add(&mut f, &work.solver.art_force[c]);
-            child = sim.links[c].sibling;
+            S::add(&mut f, &art_force[c]);
+            child = links[c].sibling;
         }
+        let dofs = &mut dofs[link.dofs.clone()];
         if link.free_block {
-            drive_free_root(link.dofs.start, link.tree, &f, work);
+            drive_free_root(&solver.root_factor[link.tree], six(dofs), &f);
             continue;
         }
-        for d in link.dofs.clone().rev() {
-            let force = work.solver.rhs[d] - S::dot(&work.motion.axis[d], &f);
-            f = S::axpy(&work.solver.gain[d], force, &f);
-            work.solver.drive[d] = force * work.solver.pivot[d];
+        for dof in dofs.iter_mut().rev() {
+            let force = dof.rhs - S::dot(&dof.axis, &f);
+            f = S::axpy(&dof.gain, force, &f);
+            dof.drive = force * dof.pivot;
         }
-        work.solver.art_force[l] = f;
+        S::copy(&mut art_force[l], &f);
     }
 }
 
-/// Outward pass: joint accelerations into `next`, and the links' accelerations without bias into `link_acc`.
+/// Outward pass: joint accelerations into `solution`, and the links' accelerations without bias into `link_acc`.
 #[inline(always)]
 pub(crate) fn accelerate<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
-    let z = T::zero();
-    for l in 0..sim.links.len() {
-        let link = &sim.links[l];
+    let links = &sim.links[..];
+    let Work { dofs, solver, .. } = work;
+    let (link_acc, solution) = (&mut solver.link_acc[..links.len()], &mut solver.solution[..]);
+    for (l, link) in links.iter().enumerate() {
+        let (dofs, solution) = (&dofs[link.dofs.clone()], &mut solution[link.dofs.clone()]);
         if link.free_block {
-            accelerate_free_root(link.dofs.start, link.tree, l, work);
+            link_acc[l] = accelerate_free_root(&solver.root_factor[link.tree], dofs, solution);
             continue;
         }
         let mut a = match link.parent {
-            Some(p) => work.solver.link_acc[p],
-            None => [z; 6],
+            Some(p) => link_acc[p],
+            None => [T::zero(); 6],
         };
-        for d in link.dofs.clone() {
-            let x = work.solver.drive[d] - S::dot(&work.solver.gain[d], &a);
-            work.solver.solution[d] = x;
-            a = S::axpy(&work.motion.axis[d], x, &a);
+        for (dof, solution) in dofs.iter().zip(solution) {
+            let x = dof.drive - S::dot(&dof.gain, &a);
+            *solution = x;
+            a = S::axpy(&dof.axis, x, &a);
         }
-        work.solver.link_acc[l] = a;
+        link_acc[l] = a;
     }
 }
 
-/// Links' accelerations without bias for the joint accelerations `acc`.
+/// Links' accelerations without bias for the joint accelerations `qacc`.
 #[inline(always)]
 pub(crate) fn link_accelerations<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
-    for (l, link) in sim.links.iter().enumerate() {
-        let mut a = link.parent.map_or([T::zero(); 6], |p| work.solver.link_acc[p]);
-        for d in link.dofs.clone() {
-            a = S::axpy(&work.motion.axis[d], work.solver.qacc[d], &a);
+    let links = &sim.links[..];
+    let (link_acc, qacc) = (&mut work.solver.link_acc[..links.len()], &work.solver.qacc[..]);
+    for (l, link) in links.iter().enumerate() {
+        let mut a = match link.parent {
+            Some(p) => link_acc[p],
+            None => [T::zero(); 6],
+        };
+        for (dof, x) in work.dofs[link.dofs.clone()].iter().zip(&qacc[link.dofs.clone()]) {
+            a = S::axpy(&dof.axis, *x, &a);
         }
-        work.solver.link_acc[l] = a;
+        link_acc[l] = a;
     }
+}
+
+/// The degrees of freedom of a free root as an array.
+#[inline(always)]
+fn six<T: Real>(dofs: &mut [DofWork<T>]) -> &mut [DofWork<T>; 6] {
+    dofs.try_into().expect("a free joint has six degrees of freedom")
 }
 
 /// Factorizes the symmetric 6x6 system of a free root.
 #[inline(always)]
-fn factor_free_root<T: Real>(d: usize, tree: usize, k: &Sym6<T>, work: &mut Work<T>) {
+fn factor_free_root<T: Real>(dofs: &[DofWork<T>; 6], k: &Sym6<T>) -> [[T; 6]; 6] {
     let mut k = *k;
     for i in 0..3 {
-        k[i] += work.solver.diag[d + 3 + i];
-        k[15 + i] += work.solver.diag[d + i];
+        k[i] += dofs[3 + i].diag;
+        k[15 + i] += dofs[i].diag;
     }
     let mut a = [
         [k[0], k[3], k[4], k[6], k[7], k[8]],
@@ -154,29 +180,30 @@ fn factor_free_root<T: Real>(d: usize, tree: usize, k: &Sym6<T>, work: &mut Work
         }
         a[p][p] = pivot;
     }
-    work.solver.root_factor[tree] = a;
+    a
 }
 
-/// Inward half of the six degrees of freedom of a free root: the pivots are on the factor's diagonal.
+/// Inward half of the six degrees of freedom of a free root with the factor `a`. The pivots are on its diagonal.
 #[inline(always)]
-fn drive_free_root<T: Real>(d: usize, tree: usize, f: &V6<T>, work: &mut Work<T>) {
-    let y = reduce_free_root(d, &work.solver.root_factor[tree], &work.motion.axis, &work.solver.rhs, f);
+fn drive_free_root<T: Real>(a: &[[T; 6]; 6], dofs: &mut [DofWork<T>; 6], f: &V6<T>) {
+    let rhs = [dofs[0].rhs, dofs[1].rhs, dofs[2].rhs, dofs[3].rhs, dofs[4].rhs, dofs[5].rhs];
+    let y = reduce_free_root(a, dofs, &rhs, f);
     for p in 0..6 {
-        work.solver.pivot[d + p] = work.solver.root_factor[tree][p][p];
-        work.solver.drive[d + p] = y[p] * work.solver.pivot[d + p];
+        dofs[p].pivot = a[p][p];
+        dofs[p].drive = y[p] * a[p][p];
     }
 }
 
 /// Propagates joint forces `rhs` and the force `f` that the motion needs inward through a free root's factor `a`.
 #[inline(always)]
-pub(crate) fn reduce_free_root<T: Real>(d: usize, a: &[[T; 6]; 6], axis: &[V6<T>], rhs: &[T], f: &V6<T>) -> V6<T> {
+pub(crate) fn reduce_free_root<T: Real>(a: &[[T; 6]; 6], dofs: &[DofWork<T>; 6], rhs: &V6<T>, f: &V6<T>) -> V6<T> {
     // torques are along the body's axes, forces along the world's
+    let axis = [&dofs[3].axis, &dofs[4].axis, &dofs[5].axis];
     let mut y = [T::zero(); 6];
     for i in 0..3 {
-        let torque =
-            axis[d + 3][i].mul_add(rhs[d + 3], axis[d + 4][i].mul_add(rhs[d + 4], axis[d + 5][i] * rhs[d + 5]));
+        let torque = axis[0][i].mul_add(rhs[3], axis[1][i].mul_add(rhs[4], axis[2][i] * rhs[5]));
         y[i] = torque - f[i];
-        y[3 + i] = rhs[d + i] - f[3 + i];
+        y[3 + i] = rhs[i] - f[3 + i];
     }
     for p in (0..6).rev() {
         for i in (0..p).rev() {
@@ -186,23 +213,21 @@ pub(crate) fn reduce_free_root<T: Real>(d: usize, a: &[[T; 6]; 6], axis: &[V6<T>
     y
 }
 
-/// Outward half of a free root.
+/// Outward half of a free root with the factor `a`. Returns the link's acceleration.
 #[inline(always)]
-fn accelerate_free_root<T: Real>(d: usize, tree: usize, l: usize, work: &mut Work<T>) {
-    let a = &work.solver.root_factor[tree];
+fn accelerate_free_root<T: Real>(a: &[[T; 6]; 6], dofs: &[DofWork<T>], solution: &mut [T]) -> V6<T> {
     let mut y = [T::zero(); 6];
     for p in 0..6 {
-        let mut v = work.solver.drive[d + p];
+        let mut v = dofs[p].drive;
         for i in 0..p {
             v = a[p][i].neg_mul_add(y[i], v);
         }
         y[p] = v;
     }
-    let spin = [y[0], y[1], y[2]];
+    let spin = ang(&y);
     for i in 0..3 {
-        work.solver.solution[d + i] = y[3 + i];
-        let s = &work.motion.axis[d + 3 + i];
-        work.solver.solution[d + 3 + i] = dot(&[s[0], s[1], s[2]], &spin);
+        solution[i] = y[3 + i];
+        solution[3 + i] = dot(&ang(&dofs[3 + i].axis), &spin);
     }
-    work.solver.link_acc[l] = y;
+    y
 }

@@ -4,7 +4,7 @@ use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::model::JointType;
 use crate::sim::{Link, LinkJoint, Sim};
-use crate::state::{Group, Work};
+use crate::state::{DofWork, Group, Work};
 
 /// Computes every link's frame, its joints' motion axes and its spatial inertia.
 ///
@@ -12,30 +12,36 @@ use crate::state::{Group, Work};
 /// transform, and single precision does not lose accuracy far from the world's origin.
 #[inline(always)]
 pub(crate) fn kinematics<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
-    for l in 0..sim.links.len() {
-        let link = &sim.links[l];
-        let root = link.parent.is_none();
-        let (mut rot, mut pos) = frame_at_parent(link, work);
-        for j in link.joints.clone() {
-            apply_joint(&sim.joints[j], j, group, work, &mut rot, &mut pos);
+    let links = &sim.links[..];
+    let n = links.len();
+    let Work { motion, dofs, .. } = work;
+    // slices of known length need no check per link
+    let (rots, places, inertias) = (&mut motion.rot[..n], &mut motion.pos[..n], &mut motion.inertia[..n]);
+    for (l, link) in links.iter().enumerate() {
+        let joints = &sim.joints[link.joints.clone()];
+        let anchors = &mut motion.anchor[link.joints.clone()];
+        let (mut rot, mut pos) = match link.parent {
+            None => ([splat3(&link.rot[0]), splat3(&link.rot[1]), splat3(&link.rot[2])], splat3(&link.pos)),
+            Some(p) => frame_at_parent(link, &rots[p], &places[p]),
+        };
+        for (joint, anchor) in joints.iter().zip(anchors.iter_mut()) {
+            *anchor = apply_joint(joint, group, dofs, &mut rot, &mut pos);
         }
-        if root {
+        if link.parent.is_none() {
             // the tree's reference point is known only now: move anchors and axes to it
-            work.motion.reference[link.tree] = pos;
-            for j in link.joints.clone() {
-                work.motion.anchor[j] = sub3(&work.motion.anchor[j], &pos);
+            motion.reference[link.tree] = pos;
+            for anchor in anchors.iter_mut() {
+                *anchor = sub3(anchor, &pos);
             }
             pos = [T::zero(); 3];
         }
-        for j in link.joints.clone() {
-            finish_axes(&sim.joints[j], j, &rot, work);
+        for (joint, anchor) in joints.iter().zip(anchors.iter()) {
+            finish_axes(joint, anchor, &rot, dofs);
         }
-        work.motion.rot[l] = rot;
-        work.motion.pos[l] = pos;
-        work.motion.inertia[l] = spatial_inertia(link, &rot, &pos);
+        (rots[l], places[l], inertias[l]) = (rot, pos, spatial_inertia(link, &rot, &pos));
     }
     if let Some(varied) = &group.varied {
-        for (inertia, factor) in work.motion.inertia.iter_mut().zip(&varied.mass) {
+        for (inertia, factor) in inertias.iter_mut().zip(&varied.mass) {
             for x in inertia {
                 *x *= *factor;
             }
@@ -43,44 +49,36 @@ pub(crate) fn kinematics<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Wor
     }
 }
 
-/// Frame of a link before its joints move it, in world coordinates for a root.
+/// Frame of a link before its joints move it, from the frame of its parent.
 #[inline(always)]
-fn frame_at_parent<T: Real>(link: &Link<T::Scalar>, work: &Work<T>) -> (Rot<T>, V3<T>) {
-    match link.parent {
-        None => ([splat3(&link.rot[0]), splat3(&link.rot[1]), splat3(&link.rot[2])], splat3(&link.pos)),
-        Some(p) => {
-            let parent = &work.motion.rot[p];
-            let pos = rotate_add(parent, &splat3(&link.pos), &work.motion.pos[p]);
-            let rot = if link.rot_is_identity { *parent } else { compose(parent, &link.rot) };
-            (rot, pos)
-        }
-    }
+fn frame_at_parent<T: Real>(link: &Link<T::Scalar>, rot: &Rot<T>, pos: &V3<T>) -> (Rot<T>, V3<T>) {
+    let pos = rotate_add(rot, &splat3(&link.pos), pos);
+    (if link.rot_is_identity { *rot } else { compose(rot, &link.rot) }, pos)
 }
 
-/// Moves a link's frame by one joint and records the joint's anchor and axis direction.
+/// Moves a link's frame by one joint and records the joint's axis direction. Returns the joint's anchor.
 #[inline(always)]
 fn apply_joint<T: Real>(
     joint: &LinkJoint<T::Scalar>,
-    j: usize,
     group: &Group<T>,
-    work: &mut Work<T>,
+    dofs: &mut [DofWork<T>],
     rot: &mut Rot<T>,
     pos: &mut V3<T>,
-) {
+) -> V3<T> {
     let (q, z, one) = (&group.qpos, T::zero(), T::lit(1.0));
     let a = joint.qpos;
     match joint.kind {
         JointType::Free => {
             *pos = [q[a], q[a + 1], q[a + 2]];
             *rot = quat_to_rot(&[q[a + 3], q[a + 4], q[a + 5], q[a + 6]]);
-            work.motion.anchor[j] = *pos;
+            *pos
         }
         JointType::Slide => {
             let dir = rotate(rot, &splat3(&joint.axis));
             let d = q[a] - T::splat(joint.q0);
             *pos = [d.mul_add(dir[0], pos[0]), d.mul_add(dir[1], pos[1]), d.mul_add(dir[2], pos[2])];
-            work.motion.axis[joint.dof] = [z, z, z, dir[0], dir[1], dir[2]];
-            work.motion.anchor[j] = *pos;
+            dofs[joint.dof].axis = [z, z, z, dir[0], dir[1], dir[2]];
+            *pos
         }
         JointType::Hinge => {
             let anchor = anchor_of(joint, rot, pos);
@@ -109,15 +107,15 @@ fn apply_joint<T: Real>(
                 *rot = [rotate(rot, &c0), rotate(rot, &c1), rotate(rot, &c2)];
             }
             restore_anchor(joint, rot, pos, &anchor);
-            work.motion.anchor[j] = anchor;
-            work.motion.axis[joint.dof] = [dir[0], dir[1], dir[2], z, z, z];
+            dofs[joint.dof].axis = [dir[0], dir[1], dir[2], z, z, z];
+            anchor
         }
         JointType::Ball => {
             let anchor = anchor_of(joint, rot, pos);
             let turn = quat_to_rot(&[q[a], q[a + 1], q[a + 2], q[a + 3]]);
             *rot = [rotate(rot, &turn[0]), rotate(rot, &turn[1]), rotate(rot, &turn[2])];
             restore_anchor(joint, rot, pos, &anchor);
-            work.motion.anchor[j] = anchor;
+            anchor
         }
     }
 }
@@ -137,22 +135,22 @@ fn restore_anchor<T: Real>(joint: &LinkJoint<T::Scalar>, rot: &Rot<T>, pos: &mut
 
 /// Computes a joint's motion axes from the link's orientation and the reference point.
 #[inline(always)]
-fn finish_axes<T: Real>(joint: &LinkJoint<T::Scalar>, j: usize, rot: &Rot<T>, work: &mut Work<T>) {
+fn finish_axes<T: Real>(joint: &LinkJoint<T::Scalar>, anchor: &V3<T>, rot: &Rot<T>, dofs: &mut [DofWork<T>]) {
     let (z, one) = (T::zero(), T::lit(1.0));
     let d = joint.dof;
     match joint.kind {
         JointType::Slide => {}
         JointType::Hinge => {
-            let s = &mut work.motion.axis[d];
-            let l = cross(&work.motion.anchor[j], &[s[0], s[1], s[2]]);
+            let s = &mut dofs[d].axis;
+            let l = cross(anchor, &ang(s));
             s[3] = l[0];
             s[4] = l[1];
             s[5] = l[2];
         }
         JointType::Ball => {
             for k in 0..3 {
-                let l = cross(&work.motion.anchor[j], &rot[k]);
-                work.motion.axis[d + k] = [rot[k][0], rot[k][1], rot[k][2], l[0], l[1], l[2]];
+                let l = cross(anchor, &rot[k]);
+                dofs[d + k].axis = [rot[k][0], rot[k][1], rot[k][2], l[0], l[1], l[2]];
             }
         }
         JointType::Free => {
@@ -160,8 +158,8 @@ fn finish_axes<T: Real>(joint: &LinkJoint<T::Scalar>, j: usize, rot: &Rot<T>, wo
             for k in 0..3 {
                 let mut e = [z; 6];
                 e[3 + k] = one;
-                work.motion.axis[d + k] = e;
-                work.motion.axis[d + 3 + k] = [rot[k][0], rot[k][1], rot[k][2], z, z, z];
+                dofs[d + k].axis = e;
+                dofs[d + 3 + k].axis = [rot[k][0], rot[k][1], rot[k][2], z, z, z];
             }
         }
     }
@@ -213,14 +211,17 @@ pub(crate) fn velocities<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Wor
     let z = T::zero();
     let v = &group.qvel;
     let gravity = group.gravity(sim);
-    for l in 0..sim.links.len() {
-        let link = &sim.links[l];
+    let links = &sim.links[..];
+    let n = links.len();
+    let Work { motion, dofs, .. } = work;
+    let (vels, bias_acc, bias_force) = (&mut motion.vel[..n], &mut motion.bias_acc[..n], &mut motion.bias_force[..n]);
+    let inertias = &motion.inertia[..n];
+    for (l, link) in links.iter().enumerate() {
         let (mut vel, mut acc) = match link.parent {
-            Some(p) => (work.motion.vel[p], work.motion.bias_acc[p]),
+            Some(p) => (vels[p], bias_acc[p]),
             None => ([z; 6], [z, z, z, -gravity[0], -gravity[1], -gravity[2]]),
         };
-        for j in link.joints.clone() {
-            let joint = &sim.joints[j];
+        for joint in &sim.joints[link.joints.clone()] {
             let d = joint.dof;
             match joint.kind {
                 JointType::Free => {
@@ -228,47 +229,45 @@ pub(crate) fn velocities<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Wor
                     for k in 0..3 {
                         vel[3 + k] += v[d + k];
                     }
-                    let s = ball_motion(&work.motion.axis, v, d + 3);
+                    let s = ball_motion(dofs, v, d + 3);
                     add_motion(&s, &mut vel, &mut acc);
                 }
                 JointType::Ball => {
-                    let s = ball_motion(&work.motion.axis, v, d);
+                    let s = ball_motion(dofs, v, d);
                     add_motion(&s, &mut vel, &mut acc);
                 }
                 JointType::Slide => {
-                    let s = &work.motion.axis[d];
+                    let (s, v) = (&dofs[d].axis, v[d]);
                     let turn = cross(&ang(&vel), &lin(s));
                     for k in 0..3 {
-                        acc[3 + k] = turn[k].mul_add(v[d], acc[3 + k]);
-                        vel[3 + k] = s[3 + k].mul_add(v[d], vel[3 + k]);
+                        acc[3 + k] = turn[k].mul_add(v, acc[3 + k]);
+                        vel[3 + k] = s[3 + k].mul_add(v, vel[3 + k]);
                     }
                 }
                 JointType::Hinge => {
-                    let s = &work.motion.axis[d];
+                    let (s, v) = (&dofs[d].axis, v[d]);
                     let rate = cross_motion(&vel, s);
-                    acc = axpy6(&rate, v[d], &acc);
-                    vel = axpy6(s, v[d], &vel);
+                    acc = axpy6(&rate, v, &acc);
+                    vel = axpy6(s, v, &vel);
                 }
             }
         }
-        work.motion.vel[l] = vel;
-        work.motion.bias_acc[l] = acc;
-        let inertia = &work.motion.inertia[l];
-        let f = inertia_mul(inertia, &acc);
-        let h = inertia_mul(inertia, &vel);
+        (vels[l], bias_acc[l]) = (vel, acc);
+        let f = inertia_mul(&inertias[l], &acc);
+        let h = inertia_mul(&inertias[l], &vel);
         // v x* h: the momentum that moves along
         let t = cross_add(&ang(&vel), &ang(&h), &cross_add(&lin(&vel), &lin(&h), &ang(&f)));
         let f = cross_add(&ang(&vel), &lin(&h), &lin(&f));
-        work.motion.bias_force[l] = [t[0], t[1], t[2], f[0], f[1], f[2]];
+        bias_force[l] = [t[0], t[1], t[2], f[0], f[1], f[2]];
     }
 }
 
 /// Motion of three rotational degrees of freedom together.
 #[inline(always)]
-fn ball_motion<T: Real>(axis: &[V6<T>], v: &[T], d: usize) -> V6<T> {
-    let s = axpy6(&axis[d], v[d], &[T::zero(); 6]);
-    let s = axpy6(&axis[d + 1], v[d + 1], &s);
-    axpy6(&axis[d + 2], v[d + 2], &s)
+fn ball_motion<T: Real>(dofs: &[DofWork<T>], v: &[T], d: usize) -> V6<T> {
+    let s = axpy6(&dofs[d].axis, v[d], &[T::zero(); 6]);
+    let s = axpy6(&dofs[d + 1].axis, v[d + 1], &s);
+    axpy6(&dofs[d + 2].axis, v[d + 2], &s)
 }
 
 #[inline(always)]

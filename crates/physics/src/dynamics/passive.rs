@@ -9,10 +9,10 @@ use crate::state::{Group, Work};
 /// Springs and dampers of the joints.
 #[inline(always)]
 pub(crate) fn joint_passive<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
-    for d in 0..sim.model.nv {
-        let damping = T::splat(sim.damping[d]);
-        work.forces.qfrc_passive[d] = -(damping * group.qvel[d]);
-        work.forces.minus_qderiv[d] = damping;
+    let forces = work.forces.qfrc_passive.iter_mut().zip(&mut work.forces.minus_qderiv);
+    for ((force, minus_qderiv), (damping, vel)) in forces.zip(sim.damping.iter().zip(&group.qvel)) {
+        let damping = T::splat(*damping);
+        (*force, *minus_qderiv) = (-(damping * *vel), damping);
     }
     for joint in &sim.joints {
         if !joint.has_spring {

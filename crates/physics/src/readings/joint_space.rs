@@ -45,7 +45,7 @@ impl<T: Real> Readings<'_, T> {
             for (l, link) in self.sim.links.iter().enumerate() {
                 let mut a = link.parent.map_or([T::zero(); 6], |p| motion[p]);
                 if link.dofs.contains(&i) {
-                    a = axpy6(&self.work.motion.axis[i], T::lit(1.0), &a);
+                    a = axpy6(&self.work.dofs[i].axis, T::lit(1.0), &a);
                 }
                 motion[l] = a;
                 forces[l] = inertia_mul(&self.work.motion.inertia[l], &a);
@@ -89,7 +89,10 @@ pub(crate) fn constraint_wrenches<T: Real>(work: &Work<T>, links: &mut [V6<T>], 
         }
     }
     for b in work.rows.blocks.iter() {
-        b.exert(links, joints);
+        b.exert_on_links(links);
+        for (dof, coefficient) in b.joint_terms() {
+            joints[*dof] = coefficient.mul_add(b.force[0], joints[*dof]);
+        }
     }
     for l in &work.rows.limits {
         joints[l.dof] += l.sign * l.force;
@@ -106,7 +109,7 @@ pub(crate) fn joint_space<T: Real>(sim: &Sim<T>, work: &Work<T>, links: &mut [V6
     for (l, link) in sim.links.iter().enumerate().rev() {
         let f = links[l];
         for d in link.dofs.clone() {
-            joints[d] += dot6(&work.motion.axis[d], &f);
+            joints[d] += dot6(&work.dofs[d].axis, &f);
         }
         if let Some(p) = link.parent {
             for i in 0..6 {

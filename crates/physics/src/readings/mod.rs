@@ -227,7 +227,7 @@ impl<'a, T: Real> Readings<'a, T> {
         let mut l = Some(link);
         while let Some(i) = l {
             for d in self.sim.links[i].dofs.clone() {
-                a = axpy6(&self.work.motion.axis[d], self.work.solver.qacc[d], &a);
+                a = axpy6(&self.work.dofs[d].axis, self.work.solver.qacc[d], &a);
             }
             l = self.sim.links[i].parent;
         }

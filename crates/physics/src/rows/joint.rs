@@ -7,6 +7,8 @@ use crate::lanes::Real;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LimitRow<T: Real> {
     pub dof: usize,
+    /// Link of the degree of freedom.
+    pub link: usize,
     /// Index among all limits, in ascending order.
     pub number: usize,
     /// +1 at the lower limit, -1 at the upper.
@@ -26,6 +28,8 @@ pub(crate) struct LimitRow<T: Real> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DryRow<T: Real> {
     pub dof: usize,
+    /// Link of the degree of freedom.
+    pub link: usize,
     pub loss: T::Scalar,
     pub d: T,
     pub u0: T,

@@ -97,24 +97,25 @@ impl<T: Real> Block<T> {
         [t[0], t[1], t[2], force[0], force[1], force[2]]
     }
 
-    /// Adds the block's force to the forces on links and joints.
+    /// The degrees of freedom that the block acts on directly, with their coefficients.
     #[inline(always)]
-    pub fn exert(&self, links: &mut [V6<T>], joints: &mut [T]) {
+    pub fn joint_terms(&self) -> &[(usize, T)] {
         match &self.jacobian {
-            Jacobian::Joints(terms) => {
-                for (dof, coefficient) in terms {
-                    joints[*dof] = coefficient.mul_add(self.force[0], joints[*dof]);
-                }
-            }
-            Jacobian::Points { sides, .. } => {
-                for (s, side) in sides.iter().enumerate() {
-                    let w = self.total_wrench(&self.force, &side.r);
-                    for (link, lanes) in &side.links {
-                        for i in 0..6 {
-                            let x = T::masked(*lanes, w[i]);
-                            links[*link][i] += if s == 0 { -x } else { x };
-                        }
-                    }
+            Jacobian::Joints(terms) => terms,
+            Jacobian::Points { .. } => &[],
+        }
+    }
+
+    /// Adds the block's force to the forces on links.
+    #[inline(always)]
+    pub fn exert_on_links(&self, links: &mut [V6<T>]) {
+        let Jacobian::Points { sides, .. } = &self.jacobian else { return };
+        for (s, side) in sides.iter().enumerate() {
+            let w = self.total_wrench(&self.force, &side.r);
+            for (link, lanes) in &side.links {
+                for i in 0..6 {
+                    let x = T::masked(*lanes, w[i]);
+                    links[*link][i] += if s == 0 { -x } else { x };
                 }
             }
         }

@@ -9,6 +9,8 @@ use crate::model::{JointType, Model};
 pub(crate) struct LimitSpec<C> {
     pub qpos: usize,
     pub dof: usize,
+    /// Link of the degree of freedom.
+    pub link: usize,
     /// Limits as sums of two numbers each. The rounding error of a limit would be large relative to a small violation.
     pub low: [C; 2],
     pub high: [C; 2],
@@ -21,6 +23,8 @@ pub(crate) struct LimitSpec<C> {
 #[derive(Clone, Debug)]
 pub(crate) struct DryFriction<C> {
     pub dof: usize,
+    /// Link of the degree of freedom.
+    pub link: usize,
     pub loss: C,
     pub soft: Softness<C>,
 }
@@ -35,13 +39,14 @@ pub(crate) struct BallLimit<C> {
 }
 
 /// Prepares the limits of hinges and slides.
-pub(super) fn limits<T: Real>(model: &Model) -> Vec<LimitSpec<T::Scalar>> {
+pub(super) fn limits<T: Real>(model: &Model, dof_link: &[usize]) -> Vec<LimitSpec<T::Scalar>> {
     let on = model.opt.flags.limit && model.opt.flags.constraint;
     let limited = model.joints.iter().filter(|j| on && j.limited && j.kind != JointType::Ball);
     limited
         .map(|j| LimitSpec {
             qpos: j.qpos_adr,
             dof: j.dof_adr,
+            link: dof_link[j.dof_adr],
             low: split::<T>(j.range[0]),
             high: split::<T>(j.range[1]),
             two_sided: j.range[1] - j.range[0] <= 2.0 * j.margin,
@@ -65,12 +70,13 @@ pub(super) fn ball_limits<T: Real>(model: &Model) -> Vec<BallLimit<T::Scalar>> {
 }
 
 /// Prepares the dry friction of the degrees of freedom.
-pub(super) fn dry_friction<T: Real>(model: &Model) -> Vec<DryFriction<T::Scalar>> {
+pub(super) fn dry_friction<T: Real>(model: &Model, dof_link: &[usize]) -> Vec<DryFriction<T::Scalar>> {
     let on = model.opt.flags.frictionloss && model.opt.flags.constraint;
     let rubbing = model.dofs.iter().enumerate().filter(|(_, d)| on && d.frictionloss > 0.0);
     rubbing
         .map(|(dof, d)| DryFriction {
             dof,
+            link: dof_link[dof],
             loss: T::scalar(d.frictionloss),
             soft: softness::<T>(model, &d.solref_friction, &d.solimp_friction, 0.0, d.invweight0),
         })

@@ -111,6 +111,8 @@ impl<T: Real> Sim<T> {
         let mount = |body: usize, pos: &[f64; 3], quat: &[f64; 4]| Mount::new::<T>(&mounts, &link_of, body, pos, quat);
         let tendons = tendon::tendons::<T>(model);
         let equalities = equality::equalities::<T>(model, &mounts, &link_of, &tendons);
+        let dof_link: Vec<usize> =
+            model.dofs.iter().map(|d| link_of[d.body].expect("dofs belong to moving bodies")).collect();
         let tree_of: Vec<usize> = links.iter().map(|l| l.tree).collect();
         let contacts = contacts::contacts::<T>(model, &mounts, &link_of, &tree_of, &options)?;
         let damped = flags.damper && model.dofs.iter().any(|d| d.damping != 0.0);
@@ -121,15 +123,14 @@ impl<T: Real> Sim<T> {
         let tolerance = 2.0 * model.opt.tolerance * model.stat.mean_inertia * model.nv.max(1) as f64;
         Ok(Sim {
             trees,
-            dof_link: model.dofs.iter().map(|d| link_of[d.body].expect("dofs belong to moving bodies")).collect(),
             joints: link::joints::<T>(model),
             armature: model.dofs.iter().map(|d| c(d.armature)).collect(),
             damping: model.dofs.iter().map(|d| c(if flags.damper { d.damping } else { 0.0 })).collect(),
             implicit_damping: implicit_fast || (damped && flags.eulerdamp && !rk4),
             implicit_fast,
             hard: contacts.hard || equalities.iter().any(|e| e.hard),
-            limits: limit::limits::<T>(model),
-            dry: limit::dry_friction::<T>(model),
+            limits: limit::limits::<T>(model, &dof_link),
+            dry: limit::dry_friction::<T>(model, &dof_link),
             ball_limits: limit::ball_limits::<T>(model),
             actuators: actuator::actuators::<T>(model),
             joint_force_ranges: actuator::joint_force_ranges::<T>(model),
@@ -155,6 +156,7 @@ impl<T: Real> Sim<T> {
             most_rows: options.most_coupled_rows.unwrap_or(MOST_COUPLED_ROWS),
             max_line_search: model.opt.ls_iterations,
             tolerance: c(tolerance),
+            dof_link,
             links,
             model: model.clone(),
         })

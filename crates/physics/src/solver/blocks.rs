@@ -56,7 +56,8 @@ kernel_fn! {
                 Jacobian::Joints(terms) => {
                     for (dof, coefficient) in terms {
                         if work.solver.stale[sim.dof_link[*dof]] {
-                            work.solver.rhs[*dof] = coefficient.mul_add(b.hold, work.solver.rhs[*dof]);
+                            let rhs = &mut work.dofs[*dof].rhs;
+                            *rhs = coefficient.mul_add(b.hold, *rhs);
                         }
                     }
                 }
@@ -203,7 +204,11 @@ kernel_fn! {
     /// Applies the blocks' forces to links and joints.
     pub(crate) fn apply_forces<'a, T>(work: &'a mut Work<T>) {
         for b in work.rows.blocks.iter() {
-            b.exert(&mut work.solver.wrench, &mut work.solver.rhs);
+            b.exert_on_links(&mut work.solver.wrench);
+            for (dof, coefficient) in b.joint_terms() {
+                let rhs = &mut work.dofs[*dof].rhs;
+                *rhs = coefficient.mul_add(b.force[0], *rhs);
+            }
         }
     }
 }

@@ -23,7 +23,7 @@ use crate::dynamics::reduce_free_root;
 use crate::lanes::{Real, kernel_fn};
 use crate::rows::{Block, Jacobian, at};
 use crate::sim::Sim;
-use crate::state::{Coupling, Solver, Work};
+use crate::state::{Coupling, Work};
 
 kernel_fn! {
     /// Computes the columns of all coupled blocks and factorizes. `fresh`: the factors of the tree changed.
@@ -72,8 +72,8 @@ fn factorize_in<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, fresh: bool
         for j in 0..=i {
             let (a, b) = (&c.scaled[i * nv..(i + 1) * nv], &c.scaled[j * nv..(j + 1) * nv]);
             let mut sum = if i == j { T::lit(1.0) } else { z };
-            for d in 0..nv {
-                sum = (a[d] * work.solver.pivot[d]).mul_add(b[d], sum);
+            for ((a, b), dof) in a.iter().zip(b).zip(&work.dofs) {
+                sum = (*a * dof.pivot).mul_add(*b, sum);
             }
             c.factor[at(i, j)] = sum;
         }
@@ -100,13 +100,14 @@ kernel_fn! {
     /// Corrects `drive` for the coupled blocks: `with_offset` at a Newton point, without it for a residual.
     pub(crate) fn correct<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, with_offset: bool) {
         let nv = sim.model.nv;
-        let Solver { coupling: c, drive, pivot, .. } = &mut work.solver;
+        let Work { dofs, solver, .. } = work;
+        let c = &mut solver.coupling;
         let n = c.rows;
         for i in 0..n {
             let column = &c.scaled[i * nv..(i + 1) * nv];
             let mut sum = if with_offset { c.offset[i] } else { T::zero() };
-            for d in 0..nv {
-                sum = column[d].mul_add(drive[d], sum);
+            for (x, dof) in column.iter().zip(dofs.iter()) {
+                sum = x.mul_add(dof.drive, sum);
             }
             for k in 0..i {
                 sum = c.factor[at(i, k)].neg_mul_add(c.y[k], sum);
@@ -122,8 +123,8 @@ kernel_fn! {
         }
         for i in 0..n {
             let column = &c.scaled[i * nv..(i + 1) * nv];
-            for d in 0..nv {
-                drive[d] = (column[d] * pivot[d]).neg_mul_add(c.y[i], drive[d]);
+            for (x, dof) in column.iter().zip(dofs.iter_mut()) {
+                dof.drive = (*x * dof.pivot).neg_mul_add(c.y[i], dof.drive);
             }
         }
     }
@@ -196,16 +197,18 @@ fn inward<T: Real, S: Space>(
         }
         let link = &sim.links[l];
         let mut f = link_force[l];
-        let dofs = link.dofs.clone();
+        let (dofs, rhs) = (&work.dofs[link.dofs.clone()], &rhs[link.dofs.clone()]);
+        let out = &mut out[link.dofs.clone()];
         if link.free_block {
-            let reduced = reduce_free_root(dofs.start, &work.solver.root_factor[link.tree], &work.motion.axis, rhs, &f);
-            out[dofs].copy_from_slice(&reduced);
+            let six = "a free joint has six degrees of freedom";
+            let (dofs, rhs) = (dofs.try_into().expect(six), rhs.try_into().expect(six));
+            out.copy_from_slice(&reduce_free_root(&work.solver.root_factor[link.tree], dofs, rhs, &f));
             continue;
         }
-        for d in dofs.rev() {
-            let force = rhs[d] - S::dot(&work.motion.axis[d], &f);
-            f = S::axpy(&work.solver.gain[d], force, &f);
-            out[d] = force;
+        for ((dof, rhs), out) in dofs.iter().zip(rhs).zip(out).rev() {
+            let force = *rhs - S::dot(&dof.axis, &f);
+            f = S::axpy(&dof.gain, force, &f);
+            *out = force;
         }
         if let Some(p) = link.parent {
             S::add(&mut link_force[p], &f);

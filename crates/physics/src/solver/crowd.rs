@@ -46,11 +46,11 @@ kernel_fn! {
 /// Lists the connections between the links of a lane, and plans the factorization.
 #[inline(always)]
 fn prepare<T: Real>(sim: &Sim<T>, work: &mut Work<T>, lane: usize) {
-    let Work { motion, solver, rows, .. } = work;
+    let Work { dofs, solver, rows, .. } = work;
     let Crowd { plan, numbers } = &mut solver.crowds[lane];
     numbers.resize(sim.links.len(), sim.model.nv);
-    for (to, from) in numbers.axis.iter_mut().zip(&motion.axis) {
-        *to = from.map(|x| x.get(lane));
+    for (to, from) in numbers.axis.iter_mut().zip(dofs.iter()) {
+        *to = from.axis.map(|x| x.get(lane));
     }
     numbers.ties.clear();
     numbers.rows.clear();
@@ -111,8 +111,8 @@ kernel_fn! {
     pub(crate) fn factorize<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, lanes: T::Mask) {
         let bits = T::bits(lanes);
         for lane in (0..T::LANES).filter(|lane| bits >> lane & 1 == 1) {
-            let Work { motion, solver, rows, stats, .. } = work;
-            let Solver { crowds, stale, in_contact, stiffness, diag, .. } = solver;
+            let Work { motion, dofs, solver, rows, stats, .. } = work;
+            let Solver { crowds, stale, in_contact, stiffness, .. } = solver;
             let (inertia, blocks) = (&motion.inertia, &rows.blocks);
             let Crowd { plan, numbers } = &mut crowds[lane];
             for (l, link) in sim.links.iter().enumerate().filter(|(l, _)| stale[*l]) {
@@ -124,7 +124,7 @@ kernel_fn! {
                     }
                 }
                 for d in link.dofs.clone() {
-                    numbers.diag[d] = diag[d].get(lane);
+                    numbers.diag[d] = dofs[d].diag.get(lane);
                 }
                 numbers.stale[l] = true;
             }
@@ -163,15 +163,14 @@ kernel_fn! {
     pub(crate) fn solve<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>, lanes: T::Mask, residual: bool) {
         let bits = T::bits(lanes);
         for lane in (0..T::LANES).filter(|lane| bits >> lane & 1 == 1) {
-            let Work { motion, forces, solver, .. } = work;
-            let applied = forces.acts_on_links();
-            let Solver { crowds, in_contact, wrench, link_force, rhs, solution, link_acc, .. } = solver;
+            let Work { motion, dofs, forces, solver, .. } = work;
+            let Solver { crowds, in_contact, wrench, link_force, solution, link_acc, .. } = solver;
             let Crowd { plan, numbers } = &mut crowds[lane];
-            for (to, from) in numbers.rhs.iter_mut().zip(rhs.iter()) {
-                *to = from.get(lane);
+            for (to, from) in numbers.rhs.iter_mut().zip(dofs.iter()) {
+                *to = from.rhs.get(lane);
             }
             for l in 0..sim.links.len() {
-                let from = if residual { link_force[l] } else { net_bias_force(motion, forces, applied, l) };
+                let from = if residual { link_force[l] } else { net_bias_force(&motion.bias_force, &forces.link_applied, l) };
                 numbers.force[l] = from.map(|x| x.get(lane));
                 if !residual && in_contact[l] {
                     for (f, w) in numbers.force[l].iter_mut().zip(&wrench[l]) {

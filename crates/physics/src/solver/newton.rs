@@ -79,9 +79,13 @@ pub(super) fn solve_system<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, 
     if any_coupled && trees {
         // links that are not stale keep their inward pass, without the correction of the last iteration
         let fresh = work.solver.stale.contains(&true);
-        work.solver.drive.copy_from_slice(&work.solver.tree_drive);
+        for dof in &mut work.dofs {
+            dof.drive = dof.tree_drive;
+        }
         factorize::<T, S>(sim, work, true);
-        work.solver.tree_drive.copy_from_slice(&work.solver.drive);
+        for dof in &mut work.dofs {
+            dof.tree_drive = dof.drive;
+        }
         coupled::factorize(sim, work, fresh);
         coupled::correct(sim, work, true);
     } else if trees {
@@ -100,10 +104,11 @@ pub(super) fn solve_system<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, 
 #[inline(always)]
 fn start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     work.solver.stale.fill(true);
-    work.solver.in_contact.fill(false);
+    let in_contact = &mut work.solver.in_contact[..];
+    in_contact.fill(false);
     let mut known = true;
     for c in &work.rows.contacts {
-        work.solver.in_contact[c.link] = true;
+        in_contact[c.link] = true;
         known &= !T::any(T::and(c.on, T::not(c.recalled)));
     }
     for l in &work.rows.limits {
@@ -126,21 +131,24 @@ fn start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) 
 /// Row values at the warm start, and the active sets of new rows.
 #[inline(always)]
 fn warm_start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
-    for d in 0..sim.model.nv {
-        work.solver.qacc[d] = if sim.warmstart { group.qacc_warmstart[d] } else { T::zero() };
+    if sim.warmstart {
+        work.solver.qacc.copy_from_slice(&group.qacc_warmstart);
+    } else {
+        work.solver.qacc.fill(T::zero());
     }
     link_accelerations::<T, S>(sim, work);
+    let (link_acc, qacc) = (&work.solver.link_acc[..], &work.solver.qacc[..]);
     for c in work.rows.contacts.iter_mut() {
-        let ja = c.of_motion(&work.solver.link_acc[c.link]);
+        let ja = c.of_motion(&link_acc[c.link]);
         c.u = add3(&ja, &c.u0);
         c.activate(T::not(c.recalled));
     }
     for l in work.rows.limits.iter_mut() {
-        l.u = l.sign.mul_add(work.solver.qacc[l.dof], l.u0);
+        l.u = l.sign.mul_add(qacc[l.dof], l.u0);
         l.activate(T::not(l.recalled));
     }
     for f in work.rows.dry.iter_mut() {
-        f.u = work.solver.qacc[f.dof] + f.u0;
+        f.u = qacc[f.dof] + f.u0;
         if !f.recalled {
             f.activate(T::not(T::none()));
         }
@@ -151,42 +159,35 @@ fn warm_start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
 #[inline(always)]
 pub(super) fn assemble<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     let z = T::zero();
-    for (l, link) in sim.links.iter().enumerate() {
-        if !work.solver.stale[l] {
-            continue;
-        }
-        for d in link.dofs.clone() {
-            work.solver.diag[d] = T::splat(sim.armature[d]);
-            work.solver.rhs[d] = work.forces.qfrc_passive_actuator[d];
-        }
-        if work.solver.in_contact[l] {
-            work.solver.stiffness[l] = [z; 21];
-            work.solver.wrench[l] = [z; 6];
+    let n = sim.links.len();
+    let Work { rows, solver, dofs, forces, .. } = work;
+    let (stale, in_contact) = (&solver.stale[..n], &solver.in_contact[..n]);
+    let (stiffness, wrench) = (&mut solver.stiffness[..n], &mut solver.wrench[..n]);
+    for l in 0..n {
+        if stale[l] && in_contact[l] {
+            (stiffness[l], wrench[l]) = ([z; 21], [z; 6]);
         }
     }
-    for c in &work.rows.contacts {
-        let l = c.link;
-        if !work.solver.stale[l] {
-            continue;
+    let joints = sim.dof_link.iter().zip(&sim.armature).zip(&forces.qfrc_passive_actuator);
+    for (dof, ((link, armature), force)) in dofs.iter_mut().zip(joints) {
+        if stale[*link] {
+            (dof.diag, dof.rhs) = (T::splat(*armature), *force);
         }
-        c.add_stiffness::<S>(&mut work.solver.stiffness[l]);
-        let w = c.wrench(&c.linear_force(&c.u0));
-        S::add(&mut work.solver.wrench[l], &w);
     }
-    for l in &work.rows.limits {
-        if !work.solver.stale[sim.dof_link[l.dof]] {
-            continue;
-        }
+    for c in rows.contacts.iter().filter(|c| stale[c.link]) {
+        c.add_stiffness::<S>(&mut stiffness[c.link]);
+        S::add(&mut wrench[c.link], &c.wrench(&c.linear_force(&c.u0)));
+    }
+    for l in rows.limits.iter().filter(|l| stale[l.link]) {
         let s = T::masked(l.active, l.d);
-        work.solver.diag[l.dof] += s;
-        work.solver.rhs[l.dof] += -(l.sign * (s * l.u0));
+        let dof = &mut dofs[l.dof];
+        dof.diag += s;
+        dof.rhs += -(l.sign * (s * l.u0));
     }
-    for f in &work.rows.dry {
-        if !work.solver.stale[sim.dof_link[f.dof]] {
-            continue;
-        }
-        work.solver.diag[f.dof] += T::masked(f.sticking, f.d);
-        work.solver.rhs[f.dof] += f.linear(f.u0);
+    for f in rows.dry.iter().filter(|f| stale[f.link]) {
+        let dof = &mut dofs[f.dof];
+        dof.diag += T::masked(f.sticking, f.d);
+        dof.rhs += f.linear(f.u0);
     }
     if !work.rows.blocks.is_empty() {
         blocks::assemble(sim, work);
@@ -197,14 +198,15 @@ pub(super) fn assemble<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
 #[inline(always)]
 fn newton_point<T: Real>(work: &mut Work<T>) -> T::Mask {
     let mut changed = T::none();
+    let (link_acc, solution) = (&work.solver.link_acc[..], &work.solver.solution[..]);
     for c in work.rows.contacts.iter_mut() {
-        changed = T::or(changed, c.newton_point(&work.solver.link_acc[c.link]));
+        changed = T::or(changed, c.newton_point(&link_acc[c.link]));
     }
     for l in work.rows.limits.iter_mut() {
-        changed = T::or(changed, l.newton_point(work.solver.solution[l.dof]));
+        changed = T::or(changed, l.newton_point(solution[l.dof]));
     }
     for f in work.rows.dry.iter_mut() {
-        changed = T::or(changed, f.newton_point(work.solver.solution[f.dof]));
+        changed = T::or(changed, f.newton_point(solution[f.dof]));
     }
     if !work.rows.blocks.is_empty() {
         changed = T::or(changed, blocks::newton_point(work));
@@ -218,14 +220,15 @@ fn advance<T: Real>(sim: &Sim<T>, work: &mut Work<T>, step: &NewtonStep<T>) {
     for (a, n) in work.solver.qacc.iter_mut().zip(&work.solver.solution) {
         *a = step.of(*a, *n);
     }
+    let stale = &mut work.solver.stale[..];
     for c in work.rows.contacts.iter_mut() {
-        work.solver.stale[c.link] |= T::any(c.advance(step));
+        stale[c.link] |= T::any(c.advance(step));
     }
     for l in work.rows.limits.iter_mut() {
-        work.solver.stale[sim.dof_link[l.dof]] |= T::any(l.advance(step));
+        stale[l.link] |= T::any(l.advance(step));
     }
     for f in work.rows.dry.iter_mut() {
-        work.solver.stale[sim.dof_link[f.dof]] |= T::any(f.advance(step));
+        stale[f.link] |= T::any(f.advance(step));
     }
     if !work.rows.blocks.is_empty() {
         blocks::advance(sim, work, *step);
@@ -254,20 +257,24 @@ fn true_forces<T: Real>(work: &mut Work<T>) {
 /// at low cost. Only for lanes in `arrived`, because the matrix is that of their active set.
 #[inline(always)]
 fn refine<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, arrived: T::Mask, coupled: bool) {
-    for d in 0..sim.model.nv {
-        work.solver.rhs[d] =
-            T::splat(sim.armature[d]).neg_mul_add(work.solver.qacc[d], work.forces.qfrc_passive_actuator[d]);
+    let joints = work.solver.qacc.iter().zip(&work.forces.qfrc_passive_actuator).zip(&sim.armature);
+    for (dof, ((acc, force), armature)) in work.dofs.iter_mut().zip(joints) {
+        dof.rhs = T::splat(*armature).neg_mul_add(*acc, *force);
     }
     apply_forces::<T, S>(work);
     link_accelerations::<T, S>(sim, work);
-    let applied = work.forces.acts_on_links();
-    for l in 0..sim.links.len() {
-        let mut f = S::momentum(&work.motion.inertia[l], &work.solver.link_acc[l]);
-        S::add(&mut f, &net_bias_force(&work.motion, &work.forces, applied, l));
-        if work.solver.in_contact[l] {
-            S::sub(&mut f, &work.solver.wrench[l]);
+    let n = sim.links.len();
+    let Work { motion, forces, solver, .. } = work;
+    let (inertia, link_acc, wrench) = (&motion.inertia[..n], &solver.link_acc[..n], &solver.wrench[..n]);
+    let (bias_force, applied) = (&motion.bias_force[..n], &forces.link_applied[..]);
+    let (in_contact, link_force) = (&solver.in_contact[..n], &mut solver.link_force[..n]);
+    for l in 0..n {
+        let mut f = S::momentum(&inertia[l], &link_acc[l]);
+        S::add(&mut f, &net_bias_force(bias_force, applied, l));
+        if in_contact[l] {
+            S::sub(&mut f, &wrench[l]);
         }
-        work.solver.link_force[l] = f;
+        link_force[l] = f;
     }
     if !T::all(work.solver.crowded) {
         bring_inward::<T, S>(sim, work);
@@ -282,17 +289,18 @@ fn refine<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, arrived: T::Mask,
     for (a, x) in work.solver.qacc.iter_mut().zip(&work.solver.solution) {
         *a += T::masked(arrived, *x);
     }
+    let (link_acc, solution) = (&work.solver.link_acc[..], &work.solver.solution[..]);
     for c in work.rows.contacts.iter_mut() {
-        let du = c.of_motion(&work.solver.link_acc[c.link]);
+        let du = c.of_motion(&link_acc[c.link]);
         for i in 0..3 {
             c.u[i] += T::masked(arrived, du[i]);
         }
     }
     for l in work.rows.limits.iter_mut() {
-        l.u += T::masked(arrived, l.sign * work.solver.solution[l.dof]);
+        l.u += T::masked(arrived, l.sign * solution[l.dof]);
     }
     for f in work.rows.dry.iter_mut() {
-        f.u += T::masked(arrived, work.solver.solution[f.dof]);
+        f.u += T::masked(arrived, solution[f.dof]);
     }
     if !work.rows.blocks.is_empty() {
         blocks::add_refinement(work, arrived);
@@ -303,20 +311,20 @@ fn refine<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, arrived: T::Mask,
 /// Adds the constraint forces to the right-hand side: contact wrenches on links, limit and friction forces on joints.
 #[inline(always)]
 pub(crate) fn apply_forces<T: Real, S: Space>(work: &mut Work<T>) {
-    for l in 0..work.solver.wrench.len() {
-        if work.solver.in_contact[l] {
-            work.solver.wrench[l] = [T::zero(); 6];
+    let (wrench, dofs) = (&mut work.solver.wrench[..], &mut work.dofs[..]);
+    for (wrench, in_contact) in wrench.iter_mut().zip(&work.solver.in_contact) {
+        if *in_contact {
+            *wrench = [T::zero(); 6];
         }
     }
     for c in &work.rows.contacts {
-        let w = c.wrench(&c.force);
-        S::add(&mut work.solver.wrench[c.link], &w);
+        S::add(&mut wrench[c.link], &c.wrench(&c.force));
     }
     for l in &work.rows.limits {
-        work.solver.rhs[l.dof] += l.sign * l.force;
+        dofs[l.dof].rhs += l.sign * l.force;
     }
     for f in &work.rows.dry {
-        work.solver.rhs[f.dof] += f.force;
+        dofs[f.dof].rhs += f.force;
     }
     if !work.rows.blocks.is_empty() {
         blocks::apply_forces(work);
@@ -326,9 +334,10 @@ pub(crate) fn apply_forces<T: Real, S: Space>(work: &mut Work<T>) {
 /// Normal forces for the readings.
 #[inline(always)]
 pub(super) fn report_forces<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
-    work.contacts.normal_force.fill(T::zero());
+    let normal_force = &mut work.contacts.normal_force[..];
+    normal_force.fill(T::zero());
     for c in &work.rows.contacts {
-        work.contacts.normal_force[c.geom] += c.force[0];
+        normal_force[c.geom] += c.force[0];
     }
     if !work.rows.blocks.is_empty() {
         blocks::report_forces(sim, work);

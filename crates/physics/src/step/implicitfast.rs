@@ -44,9 +44,9 @@ impl<T: Real> Sim<T> {
 #[inline(always)]
 fn implicit_damping<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
     let dt = T::splat(sim.dt);
-    for d in 0..sim.model.nv {
-        work.solver.diag[d] = work.forces.minus_qderiv[d].mul_add(dt, T::splat(sim.armature[d]));
-        work.solver.rhs[d] = work.forces.qfrc_passive_actuator[d];
+    let forces = work.forces.minus_qderiv.iter().zip(&work.forces.qfrc_passive_actuator).zip(&sim.armature);
+    for (dof, ((damping, force), armature)) in work.dofs.iter_mut().zip(forces) {
+        (dof.diag, dof.rhs) = (damping.mul_add(dt, T::splat(*armature)), *force);
     }
     apply_forces::<T, S>(work);
     work.solver.stale.fill(true);
@@ -74,7 +74,7 @@ fn damp<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>) {
         work.solver.link_force[l] = [T::zero(); 6];
         if !(sim.implicit_fast && link.alone) {
             for d in link.dofs.clone() {
-                work.solver.rhs[d] = -(work.forces.minus_qderiv[d] * dt * work.solver.qacc[d]);
+                work.dofs[d].rhs = -(work.forces.minus_qderiv[d] * dt * work.solver.qacc[d]);
             }
         }
     }
@@ -97,18 +97,18 @@ fn gyroscope<T: Real>(sim: &Sim<T>, work: &mut Work<T>, l: usize) {
     // symmetric, so rows are columns
     let inertia = [[jxx, jxy, jxz], [jxy, jyy, jyz], [jxz, jyz, jzz]];
     let spin = rotate(&inertia, &w);
-    let mut wrench = net_bias_force(&work.motion, &work.forces, work.forces.acts_on_links(), l);
+    let mut wrench = net_bias_force(&work.motion.bias_force, &work.forces.link_applied, l);
     if work.solver.in_contact[l] {
         for i in 0..6 {
             wrench[i] -= work.solver.wrench[l][i];
         }
     }
     // torques are along the body's axes
-    let axes = [ang(&work.motion.axis[d + 3]), ang(&work.motion.axis[d + 4]), ang(&work.motion.axis[d + 5])];
-    let torque =
-        sub3(&rotate(&axes, &[work.solver.rhs[d + 3], work.solver.rhs[d + 4], work.solver.rhs[d + 5]]), &ang(&wrench));
-    let force = sub3(&[work.solver.rhs[d], work.solver.rhs[d + 1], work.solver.rhs[d + 2]], &lin(&wrench));
-    let (mass, along) = ((m + work.solver.diag[d]).recip(), dot(&w, &moment));
+    let dofs = &work.dofs[d..d + 6];
+    let axes = [ang(&dofs[3].axis), ang(&dofs[4].axis), ang(&dofs[5].axis)];
+    let torque = sub3(&rotate(&axes, &[dofs[3].rhs, dofs[4].rhs, dofs[5].rhs]), &ang(&wrench));
+    let force = sub3(&[dofs[0].rhs, dofs[1].rhs, dofs[2].rhs], &lin(&wrench));
+    let (mass, along) = ((m + dofs[0].diag).recip(), dot(&w, &moment));
     // derivative with respect to `w`, column by column: of the force, and of the torque about the origin
     let mut columns = [[T::zero(); 3]; 3];
     let mut pulls = [[T::zero(); 3]; 3];
@@ -125,7 +125,7 @@ fn gyroscope<T: Real>(sim: &Sim<T>, work: &mut Work<T>, l: usize) {
             column[i] = bend[i].mul_add(dt, column[i]);
         }
         pull[k] = along.mul_add(dt, pull[k]);
-        column[k] += work.solver.diag[d + 3 + k];
+        column[k] += dofs[3 + k].diag;
         // eliminate the acceleration of the origin
         let arm = cross(&moment, &pull);
         for i in 0..3 {

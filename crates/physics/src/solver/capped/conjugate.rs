@@ -15,7 +15,9 @@ const ETA: f64 = 0.01;
 /// Computes `inv(M)` times the gradient into `solution`, with the factors of the unconstrained acceleration.
 #[inline(always)]
 pub(super) fn precondition<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &Capped<T>) {
-    work.solver.rhs.copy_from_slice(&c.gradient);
+    for (dof, gradient) in work.dofs.iter_mut().zip(&c.gradient) {
+        dof.rhs = *gradient;
+    }
     work.solver.link_force.fill([T::zero(); 6]);
     bring_inward::<T, S>(sim, work);
     accelerate::<T, S>(sim, work);

@@ -97,9 +97,8 @@ fn lanes<T: Real>(c: &Capped<T>) -> u32 {
 fn smooth<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped<T>) {
     work.solver.in_contact.fill(false);
     work.solver.stale.fill(true);
-    for d in 0..sim.model.nv {
-        work.solver.diag[d] = T::splat(sim.armature[d]);
-        work.solver.rhs[d] = work.forces.qfrc_passive_actuator[d];
+    for ((dof, armature), force) in work.dofs.iter_mut().zip(&sim.armature).zip(&work.forces.qfrc_passive_actuator) {
+        (dof.diag, dof.rhs) = (T::splat(*armature), *force);
     }
     factorize::<T, S>(sim, work, false);
     accelerate::<T, S>(sim, work);
@@ -163,7 +162,7 @@ fn scales<T: Real, S: Space>(sim: &Sim<T>, caps: &Caps, work: &Work<T>, c: &mut 
     c.composite.copy_from_slice(&work.motion.inertia);
     for (l, link) in sim.links.iter().enumerate().rev() {
         for d in link.dofs.clone() {
-            let axis = &work.motion.axis[d];
+            let axis = &work.dofs[d].axis;
             let diagonal = S::dot(axis, &S::momentum(&c.composite[l], axis)) + T::splat(sim.armature[d]);
             c.sums[link.tree][0] += diagonal;
         }
@@ -185,7 +184,9 @@ fn scales<T: Real, S: Space>(sim: &Sim<T>, caps: &Caps, work: &Work<T>, c: &mut 
 /// Gradient of the cost by the accelerations: the forces that the masses need minus those of the constraints.
 #[inline(always)]
 fn gradient<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped<T>) {
-    work.solver.rhs.fill(T::zero());
+    for dof in &mut work.dofs {
+        dof.rhs = T::zero();
+    }
     newton::apply_forces::<T, S>(work);
     for l in 0..sim.links.len() {
         let mut away = c.here[l];
@@ -200,8 +201,8 @@ fn gradient<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped<
         let f = work.solver.link_force[l];
         for d in link.dofs.clone() {
             let away = work.solver.qacc[d] - c.smooth[d];
-            let need = T::splat(sim.armature[d]).mul_add(away, S::dot(&work.motion.axis[d], &f));
-            c.gradient[d] = need - work.solver.rhs[d];
+            let need = T::splat(sim.armature[d]).mul_add(away, S::dot(&work.dofs[d].axis, &f));
+            c.gradient[d] = need - work.dofs[d].rhs;
         }
         if let Some(p) = link.parent {
             S::add(&mut work.solver.link_force[p], &f);
@@ -261,7 +262,7 @@ fn way<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped<T>) {
         // use the joints' steps, not the difference of the links' accelerations, so that all of them round alike
         let mut way = link.parent.map_or([T::zero(); 6], |p| c.way[p]);
         for d in link.dofs.clone() {
-            way = S::axpy(&work.motion.axis[d], c.direction[d], &way);
+            way = S::axpy(&work.dofs[d].axis, c.direction[d], &way);
         }
         let mut away = c.here[l];
         S::sub(&mut away, &c.smooth_acc[l]);

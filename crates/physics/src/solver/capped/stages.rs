@@ -144,11 +144,11 @@ kernel_fn! {
             add(&mut c.sums[tree], row, c.alpha[tree]);
         }
         for row in &work.rows.limits {
-            let tree = sim.links[sim.dof_link[row.dof]].tree;
+            let tree = sim.links[row.link].tree;
             add(&mut c.sums[tree], row, c.alpha[tree]);
         }
         for row in &work.rows.dry {
-            let tree = sim.links[sim.dof_link[row.dof]].tree;
+            let tree = sim.links[row.link].tree;
             add(&mut c.sums[tree], row, c.alpha[tree]);
         }
         for (i, b) in work.rows.blocks.iter().enumerate() {
@@ -187,11 +187,11 @@ kernel_fn! {
             }
         }
         for row in work.rows.limits.iter_mut() {
-            let tree = sim.links[sim.dof_link[row.dof]].tree;
+            let tree = sim.links[row.link].tree;
             row.u = step(c.alpha[tree], T::from_bits(c.live[tree]), row.u, row.next);
         }
         for row in work.rows.dry.iter_mut() {
-            let tree = sim.links[sim.dof_link[row.dof]].tree;
+            let tree = sim.links[row.link].tree;
             row.u = step(c.alpha[tree], T::from_bits(c.live[tree]), row.u, row.next);
         }
         for (i, b) in work.rows.blocks.iter_mut().enumerate() {

@@ -40,10 +40,4 @@ impl<T: Real> Forces<T> {
             actuator_force: vec![z; sim.model.nu],
         }
     }
-
-    /// Whether external forces act on links.
-    #[inline(always)]
-    pub fn acts_on_links(&self) -> bool {
-        !self.link_applied.is_empty()
-    }
 }

@@ -2,6 +2,7 @@
 
 mod capped;
 mod contacts;
+mod dof;
 mod forces;
 mod motion;
 mod readings;
@@ -10,6 +11,7 @@ mod solver;
 
 pub(crate) use capped::Capped;
 pub(crate) use contacts::GeomContacts;
+pub(crate) use dof::DofWork;
 pub(crate) use forces::Forces;
 pub(crate) use motion::Motion;
 pub(crate) use readings::Measured;
@@ -26,6 +28,8 @@ use crate::sim::Sim;
 #[derive(Clone, Debug)]
 pub struct Work<T: Real> {
     pub(crate) motion: Motion<T>,
+    /// Per degree of freedom.
+    pub(crate) dofs: Vec<DofWork<T>>,
     pub(crate) forces: Forces<T>,
     pub(crate) solver: Solver<T>,
     pub(crate) contacts: GeomContacts<T>,
@@ -50,6 +54,7 @@ impl<T: Real> Work<T> {
     pub fn new(sim: &Sim<T>) -> Self {
         Work {
             motion: Motion::new(sim),
+            dofs: vec![DofWork::new(); sim.model.nv],
             forces: Forces::new(sim),
             solver: Solver::new(sim),
             contacts: GeomContacts::new(sim),
@@ -79,14 +84,13 @@ impl<T: Real> Work<T> {
 }
 
 /// The part of a link's bias force that remains for joints and constraints after external forces on the link: gravity
-/// compensation, fluid and pushes. `applied` says whether there are such forces ([`Forces::acts_on_links`]), so that it
-/// is checked once instead of per link.
+/// compensation, fluid and pushes. `applied` has these forces, and is empty if there are none.
 #[inline(always)]
-pub(crate) fn net_bias_force<T: Real>(motion: &Motion<T>, forces: &Forces<T>, applied: bool, link: usize) -> V6<T> {
-    let mut f = motion.bias_force[link];
-    if applied {
+pub(crate) fn net_bias_force<T: Real>(bias_force: &[V6<T>], applied: &[V6<T>], link: usize) -> V6<T> {
+    let mut f = bias_force[link];
+    if let Some(applied) = applied.get(link) {
         for i in 0..6 {
-            f[i] -= forces.link_applied[link][i];
+            f[i] -= applied[i];
         }
     }
     f

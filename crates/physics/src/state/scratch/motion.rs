@@ -12,8 +12,6 @@ pub(crate) struct Motion<T: Real> {
     /// Link frames: rotation, and position relative to the tree's reference point.
     pub rot: Vec<Rot<T>>,
     pub pos: Vec<V3<T>>,
-    /// Motion axis of every degree of freedom.
-    pub axis: Vec<V6<T>>,
     /// Anchor of every joint, relative to the reference point (absolute while a root link is being computed).
     pub anchor: Vec<V3<T>>,
     pub inertia: Vec<Inertia<T>>,
@@ -28,12 +26,11 @@ pub(crate) struct Motion<T: Real> {
 impl<T: Real> Motion<T> {
     pub fn new(sim: &Sim<T>) -> Self {
         let z = T::zero();
-        let (nl, nv, nj) = (sim.links.len(), sim.model.nv, sim.joints.len());
+        let (nl, nj) = (sim.links.len(), sim.joints.len());
         Motion {
             reference: vec![[z; 3]; sim.trees],
             rot: vec![[[z; 3]; 3]; nl],
             pos: vec![[z; 3]; nl],
-            axis: vec![[z; 6]; nv],
             anchor: vec![[z; 3]; nj],
             inertia: vec![[z; 10]; nl],
             vel: vec![[z; 6]; nl],

@@ -20,20 +20,9 @@ pub(crate) struct Solver<T: Real> {
     pub stiffness: Vec<Sym6<T>>,
     pub wrench: Vec<V6<T>>,
     pub in_contact: Vec<bool>,
-    /// Diagonal added to the mass matrix: armature, limit stiffness, implicit damping.
-    pub diag: Vec<T>,
-    /// Joint forces of the current right-hand side.
-    pub rhs: Vec<T>,
     /// Articulated inertias and forces.
     pub art: Vec<Sym6<T>>,
     pub art_force: Vec<V6<T>>,
-    /// Per degree of freedom: articulated momentum times the inverse pivot, and the inverse pivot.
-    pub gain: Vec<V6<T>>,
-    pub pivot: Vec<T>,
-    /// Acceleration of every degree of freedom if its link's parent did not accelerate.
-    pub drive: Vec<T>,
-    /// The same before the coupled blocks' correction.
-    pub tree_drive: Vec<T>,
     /// Links whose matrix or forces changed since their last factorization.
     pub stale: Vec<bool>,
     /// Per tree with a free root: triangular factor, inverse pivots on the diagonal.
@@ -59,14 +48,8 @@ impl<T: Real> Solver<T> {
             stiffness: vec![[z; 21]; nl],
             wrench: vec![[z; 6]; nl],
             in_contact: vec![false; nl],
-            diag: vec![z; nv],
-            rhs: vec![z; nv],
             art: vec![[z; 21]; nl],
             art_force: vec![[z; 6]; nl],
-            gain: vec![[z; 6]; nv],
-            pivot: vec![z; nv],
-            drive: vec![z; nv],
-            tree_drive: vec![z; nv],
             stale: vec![true; nl],
             root_factor: vec![[[z; 6]; 6]; sim.trees],
             link_force: vec![[z; 6]; nl],
