@@ -1,9 +1,9 @@
-//! What the recursion keeps for a degree of freedom.
+//! Scratch numbers of the articulated-body recursion, one record per degree of freedom.
 
 use crate::algebra::spatial::V6;
 use crate::lanes::Real;
 
-/// What the recursion keeps for a degree of freedom. It is one record, because its loops use most of it together.
+/// Scratch numbers of the recursion for a degree of freedom. It is one record, because its loops use most of it together.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DofWork<T: Real> {
     /// Motion axis.
