@@ -1,5 +1,6 @@
 //! Requests of JavaScript and their answers.
 
+use crate::hash;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
@@ -60,6 +61,16 @@ impl Answer {
     /// Plain bytes.
     pub fn bytes(bytes: Vec<u8>) -> Self {
         Answer { object: 0, bytes }
+    }
+
+    /// Numbers in double precision.
+    pub fn numbers<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> Self {
+        Answer::bytes(numbers.into_iter().flat_map(|x| x.to_le_bytes()).collect())
+    }
+
+    /// A hash of numbers, as 16 hexadecimal digits.
+    pub fn hash(numbers: impl IntoIterator<Item = f64>) -> Self {
+        Answer::bytes(format!("{:016x}", hash(numbers)).into_bytes())
     }
 
     /// A JSON text.

@@ -2,9 +2,9 @@
 
 use crate::abi::respond;
 use crate::answer::{Answer, Failure, Request, numbers};
+use crate::model_info;
 use crate::objects::{Kind, ask, keep, with};
 use crate::poses::Poses;
-use crate::{hash, model_info};
 use marathon_envs::options::OF_LEARNING;
 use marathon_envs::{
     AgentState, AnyAgent, Autoreset, NamedClip, Options, Registry, Role, Step, VecEnv, VecEnvOptions, WithModel,
@@ -200,14 +200,15 @@ impl Env {
         Ok(())
     }
 
-    fn hash(&self) -> Result<u64, Failure> {
+    /// All states: `qpos` and `qvel` of each agent.
+    fn states(&self) -> Result<Vec<f64>, Failure> {
         let mut numbers = Vec::new();
         for agent in 0..self.env.agents() {
             let state = self.env.state(agent)?;
             numbers.extend(state.qpos);
             numbers.extend(state.qvel);
         }
-        Ok(hash(numbers))
+        Ok(numbers)
     }
 }
 
@@ -351,7 +352,7 @@ pub extern "C" fn env_push(
 pub extern "C" fn env_state(env: usize, agent: usize) -> i32 {
     ask::<Env>(env, |env, _| {
         let AgentState { qpos, qvel } = env.env.state(agent)?;
-        Ok(Answer::bytes(qpos.iter().chain(&qvel).flat_map(|x| x.to_le_bytes()).collect()))
+        Ok(Answer::numbers(qpos.iter().chain(&qvel)))
     })
 }
 
@@ -420,7 +421,7 @@ pub extern "C" fn env_load(env: usize) -> i32 {
 /// Hash of all states, as text.
 #[unsafe(no_mangle)]
 pub extern "C" fn env_hash(env: usize) -> i32 {
-    ask::<Env>(env, |env, _| Ok(Answer::bytes(format!("{:016x}", env.hash()?).into_bytes())))
+    ask::<Env>(env, |env, _| Ok(Answer::hash(env.states()?)))
 }
 
 /// Names of all tasks.

@@ -2,9 +2,9 @@
 
 use crate::abi::respond;
 use crate::answer::{Answer, Failure, Request, numbers};
+use crate::model_info;
 use crate::objects::{Kind, ask, keep, with};
 use crate::poses::Poses;
-use crate::{hash, model_info};
 use marathon_physics::{Batch, BatchOptions, Model};
 use serde::Deserialize;
 use std::cell::RefCell;
@@ -47,6 +47,11 @@ impl Simulation {
         let mut simulation = Simulation { ctrl: vec![0.0; model.nu], poses: Poses::new(&model, 1), batch };
         simulation.reset();
         Ok(simulation)
+    }
+
+    /// `qpos`, then `qvel`.
+    fn state(&self) -> Vec<f64> {
+        [self.batch.qpos(0), self.batch.qvel(0)].concat()
     }
 
     /// Back to the first keyframe; without keyframes, to the reference configuration.
@@ -136,10 +141,7 @@ pub extern "C" fn simulation_push(
 /// The state: `qpos`, then `qvel`, in double precision.
 #[unsafe(no_mangle)]
 pub extern "C" fn simulation_state(simulation: usize) -> i32 {
-    ask::<Simulation>(simulation, |simulation, _| {
-        let numbers = [simulation.batch.qpos(0), simulation.batch.qvel(0)].concat();
-        Ok(Answer::bytes(numbers.iter().flat_map(|x| x.to_le_bytes()).collect()))
-    })
+    ask::<Simulation>(simulation, |simulation, _| Ok(Answer::numbers(&simulation.state())))
 }
 
 /// Sets the state: the file `state` has `qpos`, then `qvel`.
@@ -159,8 +161,5 @@ pub extern "C" fn simulation_set_state(simulation: usize) -> i32 {
 /// Hash of the state, as text.
 #[unsafe(no_mangle)]
 pub extern "C" fn simulation_hash(simulation: usize) -> i32 {
-    ask::<Simulation>(simulation, |simulation, _| {
-        let numbers = [simulation.batch.qpos(0), simulation.batch.qvel(0)].concat();
-        Ok(Answer::bytes(format!("{:016x}", hash(numbers)).into_bytes()))
-    })
+    ask::<Simulation>(simulation, |simulation, _| Ok(Answer::hash(simulation.state())))
 }
