@@ -32,4 +32,15 @@ export interface View {
   dispose(): void;
 }
 
+/** Shows a view. If that fails, nothing of it is left. */
+export async function shown<V extends View & { show(): Promise<void> }>(view: V): Promise<V> {
+  try {
+    await view.show();
+  } catch (error) {
+    view.dispose();
+    throw error;
+  }
+  return view;
+}
+
 export type MakeView = (context: Context) => View | Promise<View>;

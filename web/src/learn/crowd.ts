@@ -26,7 +26,6 @@ export interface CrowdOptions {
 export class Crowd implements Actor {
   readonly env: Env;
   readonly clock: Clock;
-  readonly #stage: Stage;
   readonly #figure: Figure;
   readonly #agents: number;
   readonly #shift: (agent: number) => readonly [number, number];
@@ -34,11 +33,9 @@ export class Crowd implements Actor {
   readonly #bodies: PoseTrack;
   readonly #onError: (error: unknown) => void;
   readonly #focus = new Vector3(0, 0, 0.7);
-  #blobs: Blobs | null = null;
-  #failed = false;
+  readonly #blobs: Blobs;
 
   constructor(stage: Stage, marathon: Marathon, { agent, agents, gap, seed, policy, onError }: CrowdOptions) {
-    this.#stage = stage;
     this.#agents = agents;
     this.#onError = onError;
     const probe = marathon.env(agent, { agents: 1 });
@@ -52,7 +49,8 @@ export class Crowd implements Actor {
     this.#figure.spread(this.#shift);
     this.#geoms = new PoseTrack(16 * agents * model.geoms.length);
     this.#bodies = new PoseTrack(16 * agents * model.bodies.length);
-    stage.world.add(this.#figure.group);
+    this.#blobs = new Blobs(model, agents, this.#shift);
+    stage.world.add(this.#figure.group, this.#blobs.mesh);
     stage.scenery.setShadows(0.5 * gap * agents + 2);
     this.quality(stage.level);
     this.#take();
@@ -61,36 +59,23 @@ export class Crowd implements Actor {
   }
 
   frame(dt: number): Vector3 {
-    if (!this.#failed) {
-      try {
-        for (let i = this.clock.steps(dt); i > 0; i--) this.#step();
-      } catch (error) {
-        this.#failed = true;
-        this.#onError(error);
-      }
-    }
+    this.clock.run(dt, () => this.#step(), this.#onError);
     const { share } = this.clock;
     const geoms = this.#geoms.mix(share);
     this.#figure.show(geoms, this.#bodies.mix(share));
-    this.#blobs?.show(geoms);
+    this.#blobs.show(geoms);
     this.#look(dt);
     return this.#focus;
   }
 
   quality(level: Level): void {
     this.#figure.setQuality(level);
-    if (level >= 2) {
-      this.#blobs?.dispose();
-      this.#blobs = null;
-    } else if (!this.#blobs) {
-      this.#blobs = new Blobs(this.env.model, this.#agents, this.#shift);
-      this.#stage.world.add(this.#blobs.mesh);
-    }
+    this.#blobs.setQuality(level);
   }
 
   dispose(): void {
     this.#figure.dispose();
-    this.#blobs?.dispose();
+    this.#blobs.dispose();
     this.env.free();
   }
 

@@ -18,7 +18,6 @@ export class Table implements Actor {
   readonly #steps: number;
   readonly #onError: (error: unknown) => void;
   readonly #focus = new Vector3();
-  #failed = false;
   #blowups = 0;
 
   constructor(stage: Stage, simulation: Simulation, onError: (error: unknown) => void) {
@@ -39,14 +38,7 @@ export class Table implements Actor {
   }
 
   frame(dt: number): Vector3 {
-    if (!this.#failed) {
-      try {
-        for (let i = this.clock.steps(dt); i > 0; i--) this.step();
-      } catch (error) {
-        this.#failed = true;
-        this.#onError(error);
-      }
-    }
+    this.clock.run(dt, () => this.step(), this.#onError);
     const center = this.puppet.show(this.clock.share);
     // models stay where they are: only what leaves the picture is followed
     if (center.distanceTo(this.#focus) > 0.5 * this.#stage.follow.distance) this.#focus.lerp(center, 0.05);

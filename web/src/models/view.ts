@@ -3,7 +3,7 @@ import type { Simulation } from "marathon-rl";
 import { button, el, slider, toggle } from "../app/dom";
 import { fileButton } from "../app/files";
 import { isEmbedded } from "../app/route";
-import type { Context, View } from "../app/view";
+import { type Context, type View, shown } from "../app/view";
 import { Keyboard } from "../input/keyboard";
 import { PointerControl } from "../input/pointer";
 import { addressOf } from "./paths";
@@ -149,13 +149,6 @@ class Models implements View {
   }
 }
 
-export async function makeModels(context: Context): Promise<View> {
-  const view = new Models(context);
-  try {
-    await view.show();
-  } catch (error) {
-    view.dispose();
-    throw error;
-  }
-  return view;
+export function makeModels(context: Context): Promise<View> {
+  return shown(new Models(context));
 }

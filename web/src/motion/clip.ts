@@ -17,14 +17,15 @@ export class ClipPlayer implements Actor {
   readonly #stage: Stage;
   readonly #figure: Figure;
   #skin: Skin | null = null;
-  #blobs: Blobs | null = null;
+  readonly #blobs: Blobs;
   #disposed = false;
 
   constructor(stage: Stage, clip: Clip) {
     this.#stage = stage;
     this.clip = clip;
     this.#figure = new Figure(clip.model, { agents: 1, joints: true, level: stage.level });
-    stage.world.add(this.#figure.group);
+    this.#blobs = new Blobs(clip.model, 1);
+    stage.world.add(this.#figure.group, this.#blobs.mesh);
     this.quality(stage.level);
     stage.follow.set("side", 4.6);
     void this.#wear();
@@ -40,7 +41,7 @@ export class ClipPlayer implements Actor {
     const bodies = this.clip.bodyPoses(this.time).slice();
     const geoms = this.clip.poses(this.time);
     this.#figure.show(geoms, bodies);
-    this.#blobs?.show(geoms);
+    this.#blobs.show(geoms);
     this.#skin?.show(bodies);
     const [x = 0, y = 0, z = 0] = bodies.subarray(16 + 12, 16 + 15);
     return new Vector3(x, y, Math.max(0.75 * z, 0.3));
@@ -49,20 +50,14 @@ export class ClipPlayer implements Actor {
   quality(level: Level): void {
     this.#figure.setQuality(level);
     this.#skin?.setQuality(level);
-    if (level >= 2) {
-      this.#blobs?.dispose();
-      this.#blobs = null;
-    } else if (!this.#blobs) {
-      this.#blobs = new Blobs(this.clip.model, 1);
-      this.#stage.world.add(this.#blobs.mesh);
-    }
+    this.#blobs.setQuality(level);
   }
 
   dispose(): void {
     this.#disposed = true;
     this.#figure.dispose();
     this.#skin?.dispose();
-    this.#blobs?.dispose();
+    this.#blobs.dispose();
     this.clip.free();
   }
 

@@ -3,7 +3,7 @@ import { type Clip, MarathonError } from "marathon-rl";
 import { button, download, el, slider, toggle } from "../app/dom";
 import { fetchBytes, pageUrl, policy } from "../app/engine";
 import { type GivenFile, baseName, extension, fileButton } from "../app/files";
-import type { Context, View } from "../app/view";
+import { type Context, type View, shown } from "../app/view";
 import { Keyboard } from "../input/keyboard";
 import { PointerControl } from "../input/pointer";
 import { Player } from "../play/player";
@@ -180,13 +180,6 @@ class Motion implements View {
   }
 }
 
-export async function makeMotion(context: Context): Promise<View> {
-  const view = new Motion(context);
-  try {
-    await view.show();
-  } catch (error) {
-    view.dispose();
-    throw error;
-  }
-  return view;
+export function makeMotion(context: Context): Promise<View> {
+  return shown(new Motion(context));
 }

@@ -10,6 +10,7 @@ export class Clock {
   paused = false;
   #left = 0;
   #single = false;
+  #failed = false;
 
   constructor(dt: number) {
     this.dt = dt;
@@ -30,6 +31,17 @@ export class Clock {
     }
     this.#left = 0;
     return MOST;
+  }
+
+  /** Makes the steps of a frame. After a step that failed, no further ones are made. */
+  run(seconds: number, step: () => void, onError: (error: unknown) => void): void {
+    if (this.#failed) return;
+    try {
+      for (let i = this.steps(seconds); i > 0; i--) step();
+    } catch (error) {
+      this.#failed = true;
+      onError(error);
+    }
   }
 
   /** The next frame makes one step, even while time stands still. */

@@ -17,7 +17,6 @@ export interface ArenaOptions {
   readonly skin: string | null | ((bodies: readonly string[]) => string | null);
   /** Reads the devices, once per frame. */
   readonly read: () => Deflection;
-  /** The module failed in a step. */
   readonly onError: (error: unknown) => void;
 }
 
@@ -39,7 +38,6 @@ export class Arena implements Actor {
   readonly #free: boolean;
   #terrain: Terrain | null = null;
   #deflection: Deflection = REST;
-  #failed = false;
 
   constructor(stage: Stage, marathon: Marathon, { agent, options, distance, skin, read, onError }: ArenaOptions) {
     this.#stage = stage;
@@ -82,14 +80,7 @@ export class Arena implements Actor {
     const [yaw, pitch] = this.#deflection.look;
     if (yaw !== 0 || pitch !== 0) this.#stage.follow.turn(yaw * dt, pitch * dt);
     if (!isRest(this.#deflection)) this.own = false;
-    if (!this.#failed) {
-      try {
-        for (let i = this.clock.steps(dt); i > 0; i--) this.step();
-      } catch (error) {
-        this.#failed = true;
-        this.#onError(error);
-      }
-    }
+    this.clock.run(dt, () => this.step(), this.#onError);
     return this.puppet.show(this.clock.share);
   }
 

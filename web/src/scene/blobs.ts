@@ -10,6 +10,7 @@ import {
   Vector3,
 } from "three";
 import type { ModelInfo } from "marathon-rl";
+import type { Level } from "./quality";
 import { type Rod, axisOf, rodsOf } from "./rods";
 
 /** Darkness below a body that touches the ground. */
@@ -62,8 +63,14 @@ export class Blobs {
     this.mesh.renderOrder = 1;
   }
 
+  /** Hides the discs where there are shadow maps. */
+  setQuality(level: Level): void {
+    this.mesh.visible = level < 2;
+  }
+
   /** Puts the discs below bodies. `poses` are matrices of geoms, `[geom][agent][16]`. */
   show(poses: Float32Array, height: Height = () => 0): void {
+    if (!this.mesh.visible) return;
     const [axis, matrix] = [new Vector3(), new Matrix4()];
     let at = 0;
     for (const rod of this.#rods) {

@@ -45,7 +45,7 @@ export class Puppet implements Hands {
   readonly #geoms: PoseTrack;
   readonly #bodies: PoseTrack;
   readonly #line = new Line(new BufferGeometry().setFromPoints([new Vector3(), new Vector3()]), new LineBasicMaterial({ color: 0xed6b29 }));
-  #blobs: Blobs | null = null;
+  readonly #blobs: Blobs;
   #skin: Skin | null = null;
   #spring: Spring | null = null;
   #pushes: { body: number; force: Vector3; at: Vector3 | null; left: number }[] = [];
@@ -65,7 +65,8 @@ export class Puppet implements Hands {
     this.#bodies = new PoseTrack(16 * model.bodies.length);
     this.#line.visible = false;
     this.#line.frustumCulled = false;
-    stage.world.add(this.#figure.group, this.#balls.group, this.#line);
+    this.#blobs = new Blobs(model, 1);
+    stage.world.add(this.#figure.group, this.#blobs.mesh, this.#balls.group, this.#line);
     this.setQuality(stage.level);
     this.takePoses(true);
     this.show(1);
@@ -145,7 +146,7 @@ export class Puppet implements Hands {
     const [geoms, bodies] = [this.#geoms.mix(share), this.#bodies.mix(share)];
     this.#figure.show(geoms, bodies);
     this.#skin?.show(bodies);
-    this.#blobs?.show(geoms, this.ground);
+    this.#blobs.show(geoms, this.ground);
     this.#line.visible = this.#spring !== null;
     if (this.#spring) {
       const position = this.#line.geometry.getAttribute("position");
@@ -158,13 +159,7 @@ export class Puppet implements Hands {
   setQuality(level: Level): void {
     this.#figure.setQuality(level);
     this.#skin?.setQuality(level);
-    if (level >= 2) {
-      this.#blobs?.dispose();
-      this.#blobs = null;
-    } else if (!this.#blobs) {
-      this.#blobs = new Blobs(this.#body.model, 1);
-      this.#stage.world.add(this.#blobs.mesh);
-    }
+    this.#blobs.setQuality(level);
   }
 
   /** Throws a ball from the camera. */
@@ -206,7 +201,7 @@ export class Puppet implements Hands {
     this.#disposed = true;
     this.#figure.dispose();
     this.#skin?.dispose();
-    this.#blobs?.dispose();
+    this.#blobs.dispose();
     this.#balls.dispose();
     this.#balls.group.removeFromParent();
     this.#line.removeFromParent();
