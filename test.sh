@@ -43,6 +43,9 @@ export RUSTC_WORKSPACE_WRAPPER="$PWD/tests/lint.sh"
 cargo build --release "${packages[@]}" --all-targets
 cargo test --release "${packages[@]}"
 python/tests/run.sh
+if [ -n "$game" ]; then
+  MARATHON_PROGRAM="${CARGO_TARGET_DIR:-target}/release/marathon" web/test.sh --live
+fi
 tests/mlagents/run.sh
 if [ -n "$long" ]; then
   unset RUSTC_WORKSPACE_WRAPPER

@@ -74,6 +74,9 @@ for part in "${chosen[@]}"; do
     wheel-* | sdist) need maturin "$tools" && need twine "$tools" ;;
   esac
   case "$part" in
+    wheel-* | cli-*) [ -e web/dist/index.html ] || need npm 'install Node 20.19 or later' ;;
+  esac
+  case "$part" in
     cli-x86_64 | cli-aarch64) need cargo-zigbuild "$tools" ;;
   esac
   case "$part" in
@@ -114,12 +117,18 @@ if [ "$(uname -s)" = Linux ] || [ "$(uname -s)" = Darwin ]; then
   forbid=(--forbid "$root/" --forbid "$home/")
 fi
 
-notice=python/marathon_rl/THIRD-PARTY-LICENSES.txt
-trap 'rm -f "$notice"' EXIT
+notice=python/marathon_rl/THIRD-PARTY-LICENSES.txt page=python/marathon_rl/page
+trap 'rm -rf "$notice" "$page"' EXIT
 
 made=()
 licenses() {
   "$python" release/licenses.py "$1" "$2" baseline > "$3"
+}
+
+# Builds the page that `marathon serve` shows, unless a complete one is there.
+page() {
+  local modules=(web/dist/wasm/*/{relaxed,exact}.wasm)
+  [ -e "${modules[0]}" ] && [ -e "${modules[1]}" ] || web/build.sh
 }
 
 wheel() {
@@ -132,8 +141,11 @@ wheel() {
   rm -rf "$work"
   mkdir -p "$work"
   licenses marathon-python "$platform" "$notice"
+  page
+  rm -rf "$page"
+  cp -R web/dist "$page"
   maturin build --release --locked --features baseline --target "$platform" --out "$work" ${options[@]+"${options[@]}"}
-  rm -f "$notice"
+  rm -rf "$notice" "$page"
   twine check --strict "$work"/*.whl
   "$python" release/check.py ${forbid[@]+"${forbid[@]}"} "$work"/*.whl
   made=("$work"/*.whl)
@@ -171,9 +183,13 @@ cli() {
   esac
   cargo "$build" --release --locked --target "$platform" --package marathon-cli --package marathon-mlagents --bins \
     --features marathon-cli/baseline
-  local programs="$CARGO_TARGET_DIR/$platform/release"
+  local programs="$CARGO_TARGET_DIR/$platform/release" file files=()
+  page
+  while IFS= read -r file; do
+    files+=("web/dist/$file=page/$file")
+  done < <(cd web/dist && find . -type f | sed 's#^\./##' | sort)
   archive marathon "$platform" marathon-cli crates/cli/README.md=README.md \
-    "$programs/marathon$exe=marathon$exe" "$programs/marathon-player$exe=marathon-player$exe"
+    "$programs/marathon$exe=marathon$exe" "$programs/marathon-player$exe=marathon-player$exe" "${files[@]}"
   "$python" release/check.py ${static[@]+"${static[@]}"} ${forbid[@]+"${forbid[@]}"} "${made[0]}"
 }
 

@@ -22,6 +22,7 @@ bin="$scratch/env/bin"
   "$bin/python" -c 'import marathon_rl; marathon_rl.VecEnv("hopper", 2).reset()'
   "$bin/marathon" --json list > list.json
   "$bin/marathon" "${baseline[@]}"
+  "$bin/python" -c 'import marathon_rl; marathon_rl.VecEnv("hopper", 2).show().close()'
 )
 
 for platform in ${PLATFORM:-}; do

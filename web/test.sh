@@ -4,6 +4,7 @@
 #   web/test.sh            Chromium and Firefox
 #   web/test.sh --quick    a part of the tests in Chromium, without the module for browsers without relaxed SIMD
 #   web/test.sh --long     5 minutes of play in the memory test
+#   MARATHON_PROGRAM=target/release/marathon web/test.sh --live    what `marathon serve` shows in Chromium
 #
 # Chromium is /usr/bin/chromium or $CHROMIUM, Firefox is /usr/bin/firefox-esr or $FIREFOX (and Xvfb, for WebGL). On Debian, root
 # gets those that are missing. Tests of a browser that is missing are skipped. Pictures of every view are in test-pictures/.
@@ -20,8 +21,14 @@ case "${1:-}" in
     names=(--test-name-pattern='units|walker|aim|sideways|links|time|loads|bits|make no sense')
     packages=(chromium)
     ;;
+  --live)
+    MARATHON_PROGRAM="$(realpath "$OLDPWD/$MARATHON_PROGRAM" 2> /dev/null || realpath "$MARATHON_PROGRAM")"
+    export MARATHON_PROGRAM MARATHON_MODULES=relaxed
+    files=(tests/live.test.mjs)
+    packages=(chromium)
+    ;;
   --long) export MARATHON_LONG=1 ;;
-  *) echo "usage: web/test.sh [--quick | --long], found '$1'" >&2 && exit 2 ;;
+  *) echo "usage: web/test.sh [--quick | --live | --long], found '$1'" >&2 && exit 2 ;;
 esac
 missing=()
 for package in "${packages[@]}"; do

@@ -19,7 +19,7 @@ export default defineConfig({
     offline(here("public"), here("build/sw.js")),
   ],
   resolve: { alias: { "node:fs/promises": here("build/no-files.ts") } },
-  build: { target: "es2022", assetsInlineLimit: 0, modulePreload: { polyfill: false } },
+  build: { license: { fileName: "licenses.md" }, target: "es2022", assetsInlineLimit: 0, modulePreload: { polyfill: false } },
   worker: { format: "es" },
   // the package finds its modules by the folder that the page passes
   optimizeDeps: { exclude: ["marathon-rl"] },

@@ -21,6 +21,7 @@ __all__ = [
     "Spec",
     "TrainResult",
     "VecEnv",
+    "Viewer",
     "__version__",
     "_clip",
     "_policy",
@@ -285,6 +286,18 @@ class VecEnv:
         """Put agents, all or those of a mask, into states as if their episodes had begun there.
 
         Shapes are those of `get_state`. Returns the observations, ``(num_envs, obs_size)``.
+        """
+    def show(self, *, port: int = 0, page: str | PathLike[str] | None = None) -> Viewer:
+        """Show up to 16 agents in a browser on this computer.
+
+        Every step shows itself from now on, at most 60 times a second, and never waits for the page.
+
+        Args:
+            port: port on this computer; 0 takes a free one.
+            page: folder of the page; None means the one of the package, or that in ``MARATHON_PAGE``.
+
+        Returns:
+            A viewer, whose ``url`` a browser can open. A notebook displays it.
         """
     @property
     def model(self) -> Model:
@@ -813,3 +826,16 @@ def main(words: Sequence[str]) -> int:
     The first word is the program's name. It belongs at the end of a process: some commands replace the handler of
     Ctrl-C.
     """
+
+@final
+class Viewer:
+    """A page on this computer that shows an environment. ``VecEnv.show`` makes it."""
+
+    @property
+    def url(self) -> str:
+        """Address of the page. Only this computer can open it, and only with the token in the address."""
+    @property
+    def watched(self) -> bool:
+        """Whether a page is open."""
+    def close(self) -> None:
+        """End the server; pages say so."""

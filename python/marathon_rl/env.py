@@ -1,5 +1,6 @@
 """One agent as a Gymnasium environment."""
 
+from os import PathLike
 from typing import Any
 
 import gymnasium
@@ -7,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from marathon_rl import _snapshots, _spaces, _tasks, _window
-from marathon_rl._native import Renderer
+from marathon_rl._native import Renderer, Viewer
 from marathon_rl._spaces import FloatArray
 from marathon_rl._tasks import Task
 
@@ -137,6 +138,10 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         if x is not None:
             report["x_position"] = float(x[0])
         return report
+
+    def show(self, *, port: int = 0, page: str | PathLike[str] | None = None) -> Viewer:
+        """Show the agent in a browser on this computer, as `VecEnv.show`."""
+        return self._env.show(port=port, page=page)
 
     def save(self) -> bytes:
         """Everything that the episodes to come depend on; of wrappers, such as time limits, nothing."""

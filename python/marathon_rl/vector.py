@@ -1,6 +1,7 @@
 """Many agents as a Gymnasium vector environment."""
 
 from collections.abc import Sequence
+from os import PathLike
 from typing import Any
 
 import gymnasium
@@ -10,7 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from marathon_rl import _snapshots, _spaces, _tasks
-from marathon_rl._native import Model, Renderer
+from marathon_rl._native import Model, Renderer, Viewer
 from marathon_rl._spaces import BoolArray, FloatArray
 from marathon_rl._tasks import Task
 
@@ -271,6 +272,10 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
     def set_ground(self, elevations: npt.ArrayLike, field: int = 0, mask: npt.ArrayLike | None = None) -> None:
         """Set the ground of all agents or those of a mask, as `VecEnv.set_ground`."""
         self._env.set_ground(elevations, field, mask)
+
+    def show(self, *, port: int = 0, page: str | PathLike[str] | None = None) -> Viewer:
+        """Show up to 16 agents in a browser on this computer, as `VecEnv.show`."""
+        return self._env.show(port=port, page=page)
 
     def save(self) -> bytes:
         """Everything that the episodes to come depend on; of wrappers, nothing."""

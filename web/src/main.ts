@@ -12,7 +12,8 @@ if (view === "play") policy(characterOf(params.get("agent")).policy).catch(() =>
 const { start } = await import("./app/shell");
 start(document.getElementById("app") ?? document.body);
 
-if ("serviceWorker" in navigator && import.meta.env.PROD) {
+// what a program serves is never older than the program
+if ("serviceWorker" in navigator && import.meta.env.PROD && view !== "live") {
   const register = async (): Promise<void> => {
     try {
       await navigator.serviceWorker.register("sw.js");

@@ -20,6 +20,7 @@ Examples:
   marathon eval runs/hopper-1 --episodes 1000      measure a policy
   marathon export runs/hopper-1                    write an ONNX file
   marathon play runs/hopper-1                      watch it in a window, push it
+  marathon serve runs/hopper-1                     watch it in a browser while it learns
   marathon list                                    list all tasks
   marathon doctor                                  check this computer
 
@@ -58,6 +59,8 @@ pub enum Command {
     RecordDemo(RecordDemoArgs),
     /// Open the game: watch, steer, push and train characters in a window.
     Play(PlayArgs),
+    /// Show a policy, or a run while it learns, in a browser on this computer.
+    Serve(ServeArgs),
     /// List all tasks, or describe one.
     List {
         /// Task to describe: its observation, rewards, commands and options.
@@ -245,6 +248,31 @@ pub struct RenderArgs {
     /// Seed of the environments.
     #[arg(long, value_name = "S", default_value_t = marathon_learn::EvalOptions::default().seed)]
     pub seed: u64,
+}
+
+const SERVE_HELP: &str = "\
+Open the printed address in a browser. Only this computer can, and only with the token in the address. Agents act by the \
+newest policy; that of a run in training changes at each checkpoint (run.checkpoint_interval). Tabs that are slow miss \
+frames; the run in training does not notice them. Ctrl-C ends the command.";
+
+/// Options of `serve`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = SERVE_HELP)]
+pub struct ServeArgs {
+    #[command(flatten)]
+    pub source: PolicySource,
+    /// Number of agents, side by side.
+    #[arg(long, value_name = "N", default_value_t = 8)]
+    pub agents: usize,
+    /// Seed of the environments.
+    #[arg(long, value_name = "S", default_value_t = marathon_learn::EvalOptions::default().seed)]
+    pub seed: u64,
+    /// Port on this computer; 0 takes a free one.
+    #[arg(long, value_name = "PORT", default_value_t = 0)]
+    pub port: u16,
+    /// Folder of the page [default: $MARATHON_PAGE, or where the program was installed, or web/dist].
+    #[arg(long, value_name = "DIR")]
+    pub page: Option<PathBuf>,
 }
 
 const EXPORT_HELP: &str = "\

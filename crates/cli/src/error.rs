@@ -9,6 +9,7 @@ use marathon_physics::mjcf::MjcfError;
 use marathon_render::RenderError;
 use marathon_runs::RunError;
 use marathon_skin::SkinError;
+use marathon_viewer::ViewerError;
 use std::path::Path;
 
 /// An error with a text for the user: which file or option, what was found, what was expected.
@@ -34,6 +35,9 @@ pub enum CliError {
         /// Names the model's parts.
         source: SkinError,
     },
+    /// The page cannot be shown.
+    #[error(transparent)]
+    Viewer(#[from] ViewerError),
     /// A rollout process is lost. The learned policy is saved.
     #[error("{cause}\n{advice}")]
     Lost {

@@ -69,6 +69,7 @@ fn dispatch(args: &Args) -> Result<(), CliError> {
         Command::Import(import) => commands::convert::import(import, args.json),
         Command::RecordDemo(record) => commands::record_demo::run(record, args.json),
         Command::Play(play) => commands::play::run(play),
+        Command::Serve(serve) => commands::serve::run(serve, args.json),
         Command::List { agent } => commands::list::run(agent.as_deref(), args.json),
         Command::Bench(bench) => bench::run(bench, args.json),
         Command::Config(command) => commands::config::run(command, args.json),

@@ -20,6 +20,7 @@ mod spec;
 mod task;
 mod train;
 mod vec_env;
+mod viewer;
 
 use pyo3::prelude::*;
 use std::ffi::OsString;
@@ -31,7 +32,7 @@ mod _native {
     use super::{
         clip::_clip, clip::Clip, main, model::Model, players::Player, policy::_policy, policy::Policy,
         policy::evaluate, policy::load_policy, renderer::Renderer, simulation::Simulation, spec::_spec,
-        spec::CommandRange, spec::Spec, spec::ids, spec::spec, train::TrainResult, train::train, vec_env::VecEnv,
+        spec::CommandRange, spec::Spec, spec::ids, spec::spec, train::TrainResult, train::train, vec_env::VecEnv, viewer::Viewer,
     };
     use pyo3::prelude::*;
 

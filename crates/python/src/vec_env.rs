@@ -5,6 +5,7 @@ use crate::inputs::{self, Constants, Grounds, grounds_array};
 use crate::model::Model;
 use crate::number::{self, Seeds};
 use crate::spec::Spec;
+use crate::viewer::{Shown, Viewer};
 use crate::{error, options, task};
 use marathon_envs::{AgentState, Autoreset, Options, VecEnvOptions, registry};
 use marathon_physics::lanes::Isa;
@@ -12,6 +13,7 @@ use numpy::ndarray::Ix2;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
 /// Names of the autoreset modes; those of Gymnasium's `AutoresetMode` work too.
@@ -38,6 +40,7 @@ pub struct VecEnv {
     ready: bool,
     made: Made,
     model: Option<Py<Model>>,
+    shown: Option<Shown>,
 }
 
 /// Arguments that an environment was made with, as far as it does not tell them.
@@ -80,7 +83,7 @@ impl VecEnv {
         let spec = Spec::of(env.spec())?;
         let arrays = Arrays::new(py, num_envs, env.spec(), dtype.unwrap_or(spec.is_double()));
         let spec = Py::new(py, spec)?;
-        Ok(VecEnv { env: Mutex::new(env), arrays, spec, num_envs, autoreset, copy, ready: false, made, model: None })
+        Ok(VecEnv { env: Mutex::new(env), arrays, spec, num_envs, autoreset, copy, ready: false, made, model: None, shown: None })
     }
 
     /// Facts of the task, with this environment's `max_episode_steps`.
@@ -229,7 +232,23 @@ impl VecEnv {
         let env = self.env.get_mut().expect("no thread panics with the lock");
         self.arrays.step(py, env, &actions)?.map_err(error::env)?;
         let a = &self.arrays;
+        if let Some(shown) = &mut self.shown {
+            let (terminated, truncated) = (a.terminated.bind(py).readonly(), a.truncated.bind(py).readonly());
+            let (terminated, truncated) = (terminated.as_array(), truncated.as_array());
+            shown.stepped(env, |agent| terminated[agent] || truncated[agent])?;
+        }
         Ok((a.obs(py), a.reward.clone_ref(py), a.terminated.clone_ref(py), a.truncated.clone_ref(py)))
+    }
+
+    /// Shows up to 16 agents in a browser: returns a `Viewer`, whose `url` this computer can open. Steps show themselves
+    /// from now on; they never wait for the page. Port 0 takes a free one; `page` is the folder of the page.
+    #[pyo3(signature = (*, port = 0, page = None))]
+    fn show(&mut self, py: Python<'_>, port: u16, page: Option<PathBuf>) -> PyResult<Viewer> {
+        let model = self.model(py)?.get().inner.clone();
+        let (autoreset, env) = (self.autoreset, self.env.get_mut().expect("no thread panics with the lock"));
+        let (shown, viewer) = Shown::start(py, env, &model, autoreset, port, page)?;
+        self.shown = Some(shown);
+        Ok(viewer)
     }
 
     /// State of every agent in MuJoCo's layout: `qpos`, `(num_envs, nq)`, and `qvel`, `(num_envs, nv)`, m, rad, m/s and
@@ -483,6 +502,9 @@ impl VecEnv {
         let env = self.env.get_mut().expect("no thread panics with the lock");
         // rows of agents that go on are carried over into a copy
         self.arrays.write_obs(py, self.copy, |obs| f(env, obs))?.map_err(error::env)?;
+        if let Some(shown) = &mut self.shown {
+            shown.restarted(env, |_| true)?;
+        }
         self.ready = true;
         Ok(self.arrays.obs(py))
     }

@@ -78,7 +78,10 @@ impl RunFile {
     }
 
     /// Reads a description and checks every value.
-    pub(crate) fn read(path: &Path) -> Result<Self, RunError> {
+    ///
+    /// # Errors
+    /// If the file cannot be read, or a value is invalid.
+    pub fn read(path: &Path) -> Result<Self, RunError> {
         let run: RunFile = read_description(path, FORMAT, VERSION)?;
         run.config.validate_in(path, "config")?;
         run.clips.keys().try_for_each(|name| clips::check_name(name))?;

@@ -2,9 +2,8 @@
 
 use crate::abi::respond;
 use crate::answer::{Answer, Failure, Request};
-use crate::model_info;
 use crate::objects::{Kind, ask, keep, with};
-use crate::poses::Poses;
+use marathon_viewer::Poses;
 use marathon_motion::import::{Reading, Recording, read};
 use marathon_motion::{About, Clip, Mapping, check, fit, retarget};
 use marathon_physics::Model;
@@ -98,7 +97,7 @@ pub extern "C" fn clip_new() -> i32 {
                 "frames": clip.clip.frames(),
                 "loop": clip.clip.cycle().is_some(),
             },
-            "model": model_info::model(&clip.model),
+            "model": marathon_viewer::facts(&clip.model),
             "warnings": clip.warnings,
         }))?;
         Ok(answer.about(keep(clip)))

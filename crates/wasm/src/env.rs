@@ -2,9 +2,9 @@
 
 use crate::abi::respond;
 use crate::answer::{Answer, Failure, Request, numbers};
-use crate::model_info;
+use crate::task_info;
 use crate::objects::{Kind, ask, keep, with};
-use crate::poses::Poses;
+use marathon_viewer::Poses;
 use marathon_envs::options::OF_LEARNING;
 use marathon_envs::{
     AgentState, AnyAgent, Autoreset, NamedClip, Options, Registry, Role, Step, VecEnv, VecEnvOptions, WithModel,
@@ -218,7 +218,7 @@ pub extern "C" fn env_new() -> i32 {
     respond(|request| {
         let env = Env::new(request)?;
         let answer = Answer::json(&json!({
-            "spec": model_info::spec(env.env.spec()), "model": model_info::model(&env.model), "agents": env.env.agents(),
+            "spec": task_info::spec(env.env.spec()), "model": marathon_viewer::facts(&env.model), "agents": env.env.agents(),
         }))?;
         Ok(answer.about(keep(env)))
     })

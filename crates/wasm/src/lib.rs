@@ -13,9 +13,8 @@ mod answer;
 mod clip;
 mod env;
 mod hash;
-mod model_info;
+mod task_info;
 mod objects;
-mod poses;
 mod simulation;
 mod trainer;
 

@@ -2,9 +2,8 @@
 
 use crate::abi::respond;
 use crate::answer::{Answer, Failure, Request, numbers};
-use crate::model_info;
 use crate::objects::{Kind, ask, keep, with};
-use crate::poses::Poses;
+use marathon_viewer::Poses;
 use marathon_physics::{Batch, BatchOptions, Model};
 use serde::Deserialize;
 use std::cell::RefCell;
@@ -71,7 +70,7 @@ impl Simulation {
 pub extern "C" fn simulation_new() -> i32 {
     respond(|request| {
         let simulation = Simulation::new(request)?;
-        let answer = Answer::json(&model_info::model(simulation.batch.model()))?;
+        let answer = Answer::json(&marathon_viewer::facts(simulation.batch.model()))?;
         Ok(answer.about(keep(simulation)))
     })
 }

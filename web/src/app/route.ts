@@ -2,7 +2,7 @@
 
 import type { OptionValue } from "marathon-rl";
 
-export const VIEWS = ["play", "learn", "models", "motion", "policies"] as const;
+export const VIEWS = ["play", "learn", "models", "motion", "policies", "live"] as const;
 export type ViewName = (typeof VIEWS)[number];
 
 /** Settings of the whole page, before the `#`. */

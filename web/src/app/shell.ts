@@ -9,7 +9,7 @@ import type { MakeView, View } from "./view";
 import { Stage } from "../scene/stage";
 import { makePlay } from "../play/view";
 
-const NAMES: Record<ViewName, string> = { play: "Play", learn: "Learn", models: "Models", motion: "Motion", policies: "Policies" };
+const NAMES: Record<ViewName, string> = { play: "Play", learn: "Learn", models: "Models", motion: "Motion", policies: "Policies", live: "Live" };
 
 /** Views load when they are opened; the first one comes with the page. */
 const LOADERS: Record<ViewName, () => Promise<MakeView>> = {
@@ -18,6 +18,7 @@ const LOADERS: Record<ViewName, () => Promise<MakeView>> = {
   models: async () => (await import("../models/view")).makeModels,
   motion: async () => (await import("../motion/view")).makeMotion,
   policies: async () => (await import("../policies/view")).makePolicies,
+  live: async () => (await import("../live/view")).makeLive,
 };
 
 const KINDS: Readonly<Record<string, ViewName>> = {
@@ -88,8 +89,9 @@ class Shell {
 
   #header(): HTMLElement {
     const nav = el("nav", { "aria-label": "Views" });
-    for (const view of VIEWS) {
-      const link = el("a", { href: `#/${view}` }, NAMES[view]);
+    // only a program that serves the page has something live
+    for (const view of VIEWS.filter((name) => name !== "live" || this.#route.view === "live")) {
+      const link = el("a", { href: view === "live" ? linkOf(this.#route) : `#/${view}` }, NAMES[view]);
       this.#links.set(view, link);
       nav.append(link);
     }

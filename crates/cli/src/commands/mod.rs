@@ -12,5 +12,6 @@ pub mod play;
 pub mod record_demo;
 pub mod render;
 pub mod rollout_worker;
+pub mod serve;
 pub mod skin;
 pub mod train;

@@ -1,12 +1,11 @@
-//! Models and tasks as JSON.
+//! Facts of a model as JSON.
 
-use marathon_envs::Spec;
 use marathon_physics::Model;
 use marathon_physics::model::GeomType;
 use serde_json::{Value, json};
 
-/// Facts of a model for pages.
-pub fn model(model: &Model) -> Value {
+/// Facts of a model for pages: bodies, geoms, actuators and height fields, in SI units.
+pub fn facts(model: &Model) -> Value {
     let actuators = model.actuators.iter().map(|actuator| {
         let [low, high] = if actuator.ctrl_limited { actuator.ctrl_range } else { [-1.0, 1.0] };
         json!({ "name": actuator.name, "low": low, "high": high })
@@ -33,31 +32,6 @@ pub fn model(model: &Model) -> Value {
         "geoms": geoms.collect::<Vec<_>>(),
         "fields": fields.collect::<Vec<_>>(),
         "timestep": model.opt.timestep,
-    })
-}
-
-/// Facts of a task for pages.
-pub fn spec(spec: &Spec) -> Value {
-    let command = spec
-        .command
-        .iter()
-        .map(|range| json!({ "name": range.name, "low": range.low, "high": range.high, "unit": range.unit }));
-    let range = |i: usize| spec.action_range(i);
-    json!({
-        "id": spec.id,
-        "obs": spec.obs,
-        "act": spec.act,
-        "action_names": spec.action_names,
-        "action_low": (0..spec.act).map(|i| range(i)[0]).collect::<Vec<_>>(),
-        "action_high": (0..spec.act).map(|i| range(i)[1]).collect::<Vec<_>>(),
-        "dt": spec.dt,
-        "frame_skip": spec.frame_skip,
-        "max_episode_steps": spec.max_episode_steps,
-        "reward_terms": spec.reward_terms,
-        "info": spec.info,
-        "command": command.collect::<Vec<_>>(),
-        "nq": spec.nq,
-        "nv": spec.nv,
     })
 }
 
