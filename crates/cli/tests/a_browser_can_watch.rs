@@ -142,7 +142,10 @@ fn strangers_see_nothing() {
 #[test]
 fn a_run_is_shown_from_its_first_checkpoint_on() {
     let folder = tempfile::tempdir().expect("a folder");
-    common::succeed(folder.path(), &["train", "hopper", "--agents", "64", "--steps", "8192", "--out", "run", "--no-video"]);
+    common::succeed(
+        folder.path(),
+        &["train", "hopper", "--agents", "64", "--steps", "8192", "--out", "run", "--no-video"],
+    );
     let (run, aside) = (folder.path().join("run"), folder.path().join("policy.safetensors"));
     std::fs::rename(run.join("policy.safetensors"), &aside).expect("the policy");
     let server = Server::start(folder.path(), "run");

@@ -32,7 +32,8 @@ mod _native {
     use super::{
         clip::_clip, clip::Clip, main, model::Model, players::Player, policy::_policy, policy::Policy,
         policy::evaluate, policy::load_policy, renderer::Renderer, simulation::Simulation, spec::_spec,
-        spec::CommandRange, spec::Spec, spec::ids, spec::spec, train::TrainResult, train::train, vec_env::VecEnv, viewer::Viewer,
+        spec::CommandRange, spec::Spec, spec::ids, spec::spec, train::TrainResult, train::train, vec_env::VecEnv,
+        viewer::Viewer,
     };
     use pyo3::prelude::*;
 

@@ -83,7 +83,18 @@ impl VecEnv {
         let spec = Spec::of(env.spec())?;
         let arrays = Arrays::new(py, num_envs, env.spec(), dtype.unwrap_or(spec.is_double()));
         let spec = Py::new(py, spec)?;
-        Ok(VecEnv { env: Mutex::new(env), arrays, spec, num_envs, autoreset, copy, ready: false, made, model: None, shown: None })
+        Ok(VecEnv {
+            env: Mutex::new(env),
+            arrays,
+            spec,
+            num_envs,
+            autoreset,
+            copy,
+            ready: false,
+            made,
+            model: None,
+            shown: None,
+        })
     }
 
     /// Facts of the task, with this environment's `max_episode_steps`.

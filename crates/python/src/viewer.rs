@@ -84,7 +84,8 @@ impl Shown {
         page: Option<PathBuf>,
     ) -> PyResult<(Shown, Viewer)> {
         let page = page.or_else(|| packed_page(py));
-        let viewer = py.detach(|| marathon_viewer::Viewer::start(&find_page(page.as_deref())?, port)).map_err(error::any)?;
+        let viewer =
+            py.detach(|| marathon_viewer::Viewer::start(&find_page(page.as_deref())?, port)).map_err(error::any)?;
         let (url, agents, dt) = (viewer.url(), env.agents().min(MOST), env.spec().dt);
         viewer.show(&env.spec().id, &facts(model), agents, dt.max(PERIOD.as_secs_f64()));
         let shared = Arc::new(Mutex::new(Some(viewer)));

@@ -3,10 +3,10 @@
 use crate::abi::respond;
 use crate::answer::{Answer, Failure, Request};
 use crate::objects::{Kind, ask, keep, with};
-use marathon_viewer::Poses;
 use marathon_motion::import::{Reading, Recording, read};
 use marathon_motion::{About, Clip, Mapping, check, fit, retarget};
 use marathon_physics::Model;
+use marathon_viewer::Poses;
 use serde::Deserialize;
 use serde_json::json;
 use std::path::Path;

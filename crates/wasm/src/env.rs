@@ -2,9 +2,8 @@
 
 use crate::abi::respond;
 use crate::answer::{Answer, Failure, Request, numbers};
-use crate::task_info;
 use crate::objects::{Kind, ask, keep, with};
-use marathon_viewer::Poses;
+use crate::task_info;
 use marathon_envs::options::OF_LEARNING;
 use marathon_envs::{
     AgentState, AnyAgent, Autoreset, NamedClip, Options, Registry, Role, Step, VecEnv, VecEnvOptions, WithModel,
@@ -12,6 +11,7 @@ use marathon_envs::{
 use marathon_learn::policy::options;
 use marathon_learn::{BlockPolicy, Policy};
 use marathon_physics::{Isa, Model};
+use marathon_viewer::Poses;
 use serde::Deserialize;
 use serde_json::json;
 use std::ptr::null;

@@ -13,9 +13,9 @@ mod answer;
 mod clip;
 mod env;
 mod hash;
-mod task_info;
 mod objects;
 mod simulation;
+mod task_info;
 mod trainer;
 
 pub use hash::hash;

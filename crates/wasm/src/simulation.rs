@@ -3,8 +3,8 @@
 use crate::abi::respond;
 use crate::answer::{Answer, Failure, Request, numbers};
 use crate::objects::{Kind, ask, keep, with};
-use marathon_viewer::Poses;
 use marathon_physics::{Batch, BatchOptions, Model};
+use marathon_viewer::Poses;
 use serde::Deserialize;
 use std::cell::RefCell;
 use std::ptr::null;

@@ -194,7 +194,12 @@ impl Loaded {
 }
 
 /// Shows the ground of agents, in tasks that have one.
-fn lay(viewer: &Viewer, play: &mut Play<'_>, model: &Model, agents: impl Iterator<Item = usize>) -> Result<(), CliError> {
+fn lay(
+    viewer: &Viewer,
+    play: &mut Play<'_>,
+    model: &Model,
+    agents: impl Iterator<Item = usize>,
+) -> Result<(), CliError> {
     if model.hfields.is_empty() {
         return Ok(());
     }

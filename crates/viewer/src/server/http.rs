@@ -84,7 +84,8 @@ fn parse(head: &[u8]) -> std::result::Result<Option<Request>, Bad> {
     if request.method != Some("GET") {
         return Err(Bad { status: "405 Method Not Allowed", text: "only GET is known".into() });
     }
-    let (path, query) = request.path.unwrap_or_default().split_once('?').unwrap_or((request.path.unwrap_or_default(), ""));
+    let (path, query) =
+        request.path.unwrap_or_default().split_once('?').unwrap_or((request.path.unwrap_or_default(), ""));
     let path = decode(path).ok_or_else(|| Bad::request("the path is not UTF-8"))?.into_owned();
     let host = request.headers.iter().find(|line| line.name.eq_ignore_ascii_case("host"));
     let host = host.map_or_else(String::new, |line| String::from_utf8_lossy(line.value).to_ascii_lowercase());
@@ -138,7 +139,9 @@ mod tests {
 
     #[test]
     fn requests_are_read() {
-        let Ok(found) = request("GET /a%20b?x=1&token=ab HTTP/1.1\r\nHost: LOCALHOST:80\r\n\r\n") else { panic!("refused") };
+        let Ok(found) = request("GET /a%20b?x=1&token=ab HTTP/1.1\r\nHost: LOCALHOST:80\r\n\r\n") else {
+            panic!("refused")
+        };
         assert_eq!(found.path, "/a b");
         assert_eq!(found.parameter("token"), Some("ab"));
         assert_eq!(found.parameter("tok"), None);

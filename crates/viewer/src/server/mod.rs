@@ -49,7 +49,8 @@ impl Viewer {
     /// If the folder has no page, or the port is taken.
     pub fn start(page: &Path, port: u16) -> Result<Viewer, ViewerError> {
         let page = files::check(page)?;
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(|error| ViewerError::Port { port, error })?;
+        let listener =
+            TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(|error| ViewerError::Port { port, error })?;
         let address = listener.local_addr().map_err(|error| ViewerError::Port { port, error })?;
         let token = token()?;
         let channel = Arc::new(Channel::default());
@@ -153,7 +154,11 @@ impl Shared {
             return files::answer(&mut stream, &self.page, &request.path);
         }
         if !same(request.parameter("token").unwrap_or_default(), &self.token) {
-            return http::refuse(&mut stream, "403 Forbidden", "The token is wrong; use the address that the program printed.");
+            return http::refuse(
+                &mut stream,
+                "403 Forbidden",
+                "The token is wrong; use the address that the program printed.",
+            );
         }
         http::begin(&mut stream, "application/octet-stream", None)?;
         self.channel.send(&mut stream)
