@@ -10,12 +10,14 @@
 
 mod abi;
 mod answer;
+#[cfg(feature = "clip")]
 mod clip;
 mod env;
 mod hash;
 mod objects;
 mod simulation;
 mod task_info;
+#[cfg(feature = "trainer")]
 mod trainer;
 
 pub use hash::hash;

@@ -157,6 +157,19 @@ pub extern "C" fn simulation_set_state(simulation: usize) -> i32 {
     })
 }
 
+/// Heights of a height field, m, in single precision, row by row.
+#[unsafe(no_mangle)]
+pub extern "C" fn simulation_ground(simulation: usize, field: usize) -> i32 {
+    ask::<Simulation>(simulation, |simulation, _| {
+        let fields = simulation.batch.model().hfields.len();
+        if field >= fields {
+            return Err(format!("there is no height field {field}, the model has {fields}").into());
+        }
+        let heights = simulation.batch.ground(0, field);
+        Ok(Answer::bytes(heights.iter().flat_map(|x| x.to_le_bytes()).collect()))
+    })
+}
+
 /// Hash of the state, as text.
 #[unsafe(no_mangle)]
 pub extern "C" fn simulation_hash(simulation: usize) -> i32 {

@@ -56,8 +56,28 @@ function wall(): string {
   return `<mujoco model="wall"><worldbody>${GROUND}${boxes}${ball}</worldbody></mujoco>`;
 }
 
+/** Balls and boxes that roll down a bowl with bumps. */
+function bowl(): string {
+  const [side, half] = [41, 2.5];
+  const heights: string[] = [];
+  for (let i = 0; i < side * side; i++) {
+    const [x, y] = [((i % side) / (side - 1)) * 2 - 1, (Math.floor(i / side) / (side - 1)) * 2 - 1];
+    heights.push((0.35 * (x * x + y * y) + 0.1 * (1 + Math.sin(7 * x) * Math.cos(6 * y))).toFixed(3));
+  }
+  let bodies = "";
+  for (let i = 0; i < 9; i++) {
+    const place = `${(((i % 3) - 1) * 1.2).toFixed(2)} ${((Math.floor(i / 3) - 1) * 1.2).toFixed(2)} 1.9`;
+    const color = ["0.93 0.42 0.16", "0.13 0.53 0.8", "0.22 0.65 0.38"][i % 3] ?? "1 1 1";
+    const shape = i % 2 ? 'type="box" size="0.16 0.12 0.1"' : 'type="sphere" size="0.16"';
+    bodies += `<body pos="${place}"><freejoint/><geom ${shape} rgba="${color} 1" mass="1" condim="6" friction="1 0.01 0.002"/></body>`;
+  }
+  return `<mujoco model="bowl"><asset><hfield name="bowl" nrow="${side}" ncol="${side}" size="${half} ${half} 1 0.2"
+    elevation="${heights.join(" ")}"/></asset><worldbody><geom type="hfield" hfield="bowl"/>${bodies}</worldbody></mujoco>`;
+}
+
 export const SAMPLES: readonly Sample[] = [
   { name: "arm", label: "Arm", xml: arm() },
   { name: "chain", label: "Chain", xml: chain(7) },
   { name: "wall", label: "Wall", xml: wall() },
+  { name: "bowl", label: "Bowl", xml: bowl() },
 ];

@@ -5,6 +5,7 @@ import { Clock } from "../physics/clock";
 import { Puppet } from "../scene/puppet";
 import type { Level } from "../scene/quality";
 import type { Actor, Stage } from "../scene/stage";
+import { Terrain } from "../scene/terrain";
 
 /** Time between two forces of the hand, s. */
 const PERIOD = 0.01;
@@ -18,6 +19,7 @@ export class Table implements Actor {
   readonly #steps: number;
   readonly #onError: (error: unknown) => void;
   readonly #focus = new Vector3();
+  readonly #terrains: Terrain[] = [];
   #blowups = 0;
 
   constructor(stage: Stage, simulation: Simulation, onError: (error: unknown) => void) {
@@ -30,6 +32,7 @@ export class Table implements Actor {
     this.clock = new Clock(dt);
     this.puppet = new Puppet(stage, simulation, dt, false);
     this.controls = Float64Array.from(simulation.ctrl);
+    this.#layGround();
     const size = this.#size();
     this.#focus.z = Math.max(this.#focus.z, 0.05);
     stage.follow.set("side", Math.min(Math.max(2.6 * size, 1), 40));
@@ -67,7 +70,27 @@ export class Table implements Actor {
 
   dispose(): void {
     this.puppet.dispose();
+    for (const terrain of this.#terrains) terrain.dispose();
     this.#simulation.free();
+  }
+
+  /** Draws the height fields. */
+  #layGround(): void {
+    const { model } = this.#simulation;
+    for (const [i, field] of model.fields.entries()) {
+      const geom = model.geoms.findIndex(({ field: own }) => own === i);
+      if (geom < 0) continue;
+      const terrain = new Terrain(field, this.#simulation.ground(i), this.#stage.scenery.checker);
+      // it may be turned
+      terrain.mesh.matrixAutoUpdate = false;
+      terrain.mesh.matrix.fromArray(this.#simulation.poses(), 16 * geom);
+      this.#terrains.push(terrain);
+      this.#stage.world.add(terrain.mesh);
+    }
+    const [first] = this.#terrains;
+    if (!first) return;
+    this.#stage.scenery.setLevel(model.geoms.some(({ kind }) => kind === "plane"));
+    this.puppet.ground = (x, y) => first.height(x, y);
   }
 
   /** Finds the middle of what moves, and returns how far it reaches, m. */

@@ -60,6 +60,12 @@ export class Simulation extends Handle {
     this.bridge.call((exports) => exports.simulation_set_state(this.object), {}, { state: joinState(qpos, qvel) });
   }
 
+  /** Heights of a height field, m, `[row][column]`. */
+  ground(field: number): Float32Array {
+    this.bridge.call((exports) => exports.simulation_ground(this.object, field));
+    return new Float32Array(this.bridge.bytes().buffer);
+  }
+
   /** 16 hexadecimal digits over the bits of the state. They are the same in all browsers and in the native program. */
   hash(): string {
     this.bridge.call((exports) => exports.simulation_hash(this.object));

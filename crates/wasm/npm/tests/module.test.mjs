@@ -95,6 +95,14 @@ test("a model is simulated, and its poses follow", () => {
   assert.ok(simulation.state().qpos[2] > 2);
 });
 
+test("height fields have heights in meters", () => {
+  const xml = `<mujoco><asset><hfield name="hill" nrow="2" ncol="3" size="3 2 0.5 0.1" elevation="0 1 2 0 1 4"/></asset>
+    <worldbody><geom type="hfield" hfield="hill"/></worldbody></mujoco>`;
+  const simulation = marathon.simulation(xml);
+  assert.deepEqual([...simulation.ground(0)], [0, 0.125, 0.25, 0, 0.125, 0.5]);
+  assert.throws(() => simulation.ground(1), /no height field 1/);
+});
+
 test("errors name the place, and missing files", () => {
   const refused = (xml) => {
     try {
