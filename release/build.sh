@@ -127,7 +127,7 @@ licenses() {
 
 # Builds the page that `marathon serve` shows, unless a complete one is there.
 page() {
-  local modules=(web/dist/wasm/*/{relaxed,exact}.wasm)
+  local modules=(web/dist/wasm/*/{relaxed,exact-play}.wasm)
   [ -e "${modules[0]}" ] && [ -e "${modules[1]}" ] || web/build.sh
 }
 

@@ -15,6 +15,7 @@ for tool in node npm; do
 done
 package=../crates/wasm/npm/dist
 read -ra modules <<< "${MARATHON_MODULES:-relaxed exact}"
+modules+=("${modules[@]/%/-play}")
 for file in "${modules[@]/%/.wasm}" index.js; do
   if [ ! -e "$package/$file" ]; then
     ../crates/wasm/build.sh "${modules[@]}"

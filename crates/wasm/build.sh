@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
-# Builds the npm package in npm/dist: the modules relaxed.wasm and exact.wasm, and the TypeScript wrapper.
+# Builds the npm package in npm/dist: the modules and the TypeScript wrapper.
 #
-#   crates/wasm/build.sh [relaxed|exact]    default: both modules
+#   crates/wasm/build.sh [MODULE ...]    relaxed, exact, relaxed-play or exact-play; default: all four
+#
+# Modules for play have neither training nor the import of recordings.
 #
 # Needs rustup and Node 20 with npm; installs Rust's wasm target.
 set -euo pipefail
@@ -17,16 +19,17 @@ done
 rustup --quiet target add wasm32-unknown-unknown
 
 mkdir -p npm/dist
-for module in "${@:-relaxed exact}"; do
-  for lanes in $module; do
-    features='+simd128'
+for module in "${@:-relaxed exact relaxed-play exact-play}"; do
+  for name in $module; do
+    lanes="${name%-play}" features='+simd128' options=()
     [ "$lanes" = exact ] || features+=',+relaxed-simd'
-    echo "crates/wasm/build.sh: $lanes.wasm" >&2
+    [ "$lanes" = "$name" ] || options=(--no-default-features)
+    echo "crates/wasm/build.sh: $name.wasm" >&2
     # LLVM's vectorizers would add relaxed instructions of their own, whose results differ between processors
     env -u RUSTC_WORKSPACE_WRAPPER CARGO_TARGET_DIR="$target/$lanes" \
       RUSTFLAGS="-C target-feature=$features -C no-vectorize-loops -C no-vectorize-slp" \
-      cargo build --quiet --locked --profile web --target wasm32-unknown-unknown -p marathon-wasm
-    cp "$target/$lanes/wasm32-unknown-unknown/web/marathon_wasm.wasm" "npm/dist/$lanes.wasm"
+      cargo build --quiet --locked --profile web --target wasm32-unknown-unknown -p marathon-wasm "${options[@]}"
+    cp "$target/$lanes/wasm32-unknown-unknown/web/marathon_wasm.wasm" "npm/dist/$name.wasm"
   done
 done
 cd npm

@@ -10,7 +10,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 modules=(relaxed)
 [ "${1:-}" != --both ] || modules+=(exact)
-./build.sh "${modules[@]}"
+./build.sh "${modules[@]}" "${modules[@]/%/-play}"
 cd npm
 # Node 20 has relaxed SIMD behind a flag that later ones do not know
 flag=--experimental-wasm-relaxed-simd

@@ -8,7 +8,7 @@ import { join } from "node:path";
 import type { Plugin } from "vite";
 import { CLIPS } from "../src/motion/samples.ts";
 
-const MODULES = ["relaxed.wasm", "exact.wasm"];
+const MODULES = ["relaxed.wasm", "exact.wasm", "relaxed-play.wasm", "exact-play.wasm"];
 
 export interface Folders {
   readonly modules: string;

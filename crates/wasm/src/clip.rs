@@ -3,8 +3,13 @@
 use crate::abi::respond;
 use crate::answer::{Answer, Failure, Request};
 use crate::objects::{Kind, ask, keep, with};
-use marathon_motion::import::{Reading, Recording, read};
-use marathon_motion::{About, Clip, Mapping, check, fit, retarget};
+use marathon_motion::Clip;
+#[cfg(feature = "full")]
+use marathon_motion::{
+    About, Mapping, check, fit,
+    import::{Reading, Recording, read},
+    retarget,
+};
 use marathon_physics::Model;
 use marathon_viewer::Poses;
 use serde::Deserialize;
@@ -13,6 +18,7 @@ use std::path::Path;
 use std::ptr::null;
 
 /// Frames per second of a clip.
+#[cfg(feature = "full")]
 const FPS: f64 = 60.0;
 
 /// A clip with the model of its character.
@@ -56,7 +62,13 @@ impl MotionClip {
     }
 }
 
+#[cfg(not(feature = "full"))]
+fn import(path: &Path, _: &[u8], _: &Model, _: &Request) -> Result<(Clip, Vec<String>), Failure> {
+    Err(format!("{}: this module reads only .motion files; the full one imports recordings", path.display()).into())
+}
+
 /// A recording as a clip, with warnings, by the defaults of `marathon motion import`.
+#[cfg(feature = "full")]
 fn import(path: &Path, bytes: &[u8], model: &Model, request: &Request) -> Result<(Clip, Vec<String>), Failure> {
     let beside = |name: &str| request.files().get(name).cloned().ok_or_else(|| "this file was not given".to_string());
     let Recording { mut animation, notes } =

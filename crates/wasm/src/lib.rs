@@ -10,14 +10,13 @@
 
 mod abi;
 mod answer;
-#[cfg(feature = "clip")]
 mod clip;
 mod env;
 mod hash;
 mod objects;
 mod simulation;
 mod task_info;
-#[cfg(feature = "trainer")]
+#[cfg(feature = "full")]
 mod trainer;
 
 pub use hash::hash;

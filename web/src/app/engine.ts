@@ -11,10 +11,13 @@ export function pageUrl(path: string): URL {
 
 let loading: Promise<Marathon> | undefined;
 
-/** Loads the module; a second call returns the same instance. `?lanes=exact` takes the module for older browsers. */
+/** Folder of the modules. Workers have no document that tells it. */
+export const MODULES = pageUrl(`${__WASM_FOLDER__}/`).href;
+
+/** Loads the module for play, the smaller one; a second call returns the same instance. `?lanes=exact` takes the module for older browsers. */
 export function engine(): Promise<Marathon> {
   const lanes = new URLSearchParams(location.search).get("lanes");
-  loading ??= load({ base: pageUrl(`${__WASM_FOLDER__}/`), ...(lanes === "exact" ? { lanes } : {}) });
+  loading ??= load({ base: MODULES, parts: "play", ...(lanes === "exact" ? { lanes } : {}) });
   return loading;
 }
 

@@ -2,7 +2,7 @@
 import type { Config, Iteration } from "marathon-rl";
 
 export type ToWorker =
-  | { readonly type: "start"; readonly module: WebAssembly.Module; readonly lanes: "relaxed" | "exact"; readonly agent: string; readonly config: Config }
+  | { readonly type: "start"; readonly base: string; readonly lanes: "relaxed" | "exact"; readonly agent: string; readonly config: Config }
   | { readonly type: "pause" }
   | { readonly type: "continue" };
 

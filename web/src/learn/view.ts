@@ -1,5 +1,6 @@
 /** Learn: a figure learns from nothing in a worker, while figures on the screen act by its newest policy. */
 import { button, download, el, select } from "../app/dom";
+import { MODULES } from "../app/engine";
 import { reason } from "../app/messages";
 import { integer } from "../app/route";
 import type { Context, View } from "../app/view";
@@ -150,7 +151,7 @@ class Learn implements View {
     this.#worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.#take(data);
     this.#worker.onerror = (event) => this.#stop(event.message || "the training cannot start");
     const config = { run: { total_steps: this.#steps, seed: this.#seed } };
-    this.#tell({ type: "start", module: marathon.module, lanes: marathon.lanes, agent: this.#task.agent, config });
+    this.#tell({ type: "start", base: MODULES, lanes: marathon.lanes, agent: this.#task.agent, config });
     this.#set("running");
   }
 

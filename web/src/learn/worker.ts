@@ -30,8 +30,8 @@ scope.onmessage = ({ data }: MessageEvent<ToWorker>) => {
   }
 };
 
-async function start({ module, lanes, agent, config }: Extract<ToWorker, { type: "start" }>): Promise<void> {
-  const marathon = await load({ module, lanes });
+async function start({ base, lanes, agent, config }: Extract<ToWorker, { type: "start" }>): Promise<void> {
+  const marathon = await load({ base, lanes });
   trainer = marathon.trainer(agent, config);
   running = true;
   iterate();

@@ -1,8 +1,10 @@
 /** Imports recordings beside the page, which stays responsive. */
 import type { Marathon } from "marathon-rl";
+import { MODULES } from "../app/engine";
 
 export interface Recording {
-  readonly module: WebAssembly.Module;
+  /** Folder of the modules: the page's own one is for play. */
+  readonly base: string;
   readonly lanes: "relaxed" | "exact";
   readonly character: string;
   readonly name: string;
@@ -22,7 +24,7 @@ export interface Import {
 }
 
 /** Starts to import a recording. */
-export function startImport({ module, lanes }: Marathon, recording: Omit<Recording, "module" | "lanes">): Import {
+export function startImport({ lanes }: Marathon, recording: Omit<Recording, "base" | "lanes">): Import {
   const worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
   const result = new Promise<{ motion: Uint8Array; warnings: readonly string[] }>((resolve, reject) => {
     worker.onmessage = ({ data }: MessageEvent<Imported>) => {
@@ -32,6 +34,6 @@ export function startImport({ module, lanes }: Marathon, recording: Omit<Recordi
     };
     worker.onerror = (event) => reject(new Error(event.message || "the import cannot start"));
   });
-  worker.postMessage({ module, lanes, ...recording } satisfies Recording);
+  worker.postMessage({ base: MODULES, lanes, ...recording } satisfies Recording);
   return { result, stop: () => worker.terminate() };
 }

@@ -15,8 +15,8 @@ scope.onmessage = ({ data }) => {
   );
 };
 
-async function run({ module, lanes, character, name, bytes, files }: Recording): Promise<Imported> {
-  const marathon = await load({ module, lanes });
+async function run({ base, lanes, character, name, bytes, files }: Recording): Promise<Imported> {
+  const marathon = await load({ base, lanes });
   const clip = marathon.importMotion(character, name, bytes, files);
   return { motion: clip.bytes(), warnings: clip.warnings };
 }

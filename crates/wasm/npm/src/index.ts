@@ -15,7 +15,7 @@ import type { Config, EnvOptions, PolicyInfo } from "./types.js";
 export { Clip } from "./clip.js";
 export { Env, type Vector } from "./env.js";
 export { MarathonError } from "./error.js";
-export type { Lanes, LoadOptions } from "./load.js";
+export type { Lanes, LoadOptions, Parts } from "./load.js";
 export { Simulation } from "./simulation.js";
 export { Trainer } from "./trainer.js";
 export type * from "./types.js";
@@ -63,7 +63,7 @@ export class Marathon {
     return Simulation.create(this.#bridge, xml, files, name);
   }
 
-  /** Creates a run in training. `config` has the keys of a configuration file; others come from the preset of the task. */
+  /** Creates a run in training; modules for play have none. `config` has the keys of a configuration file; others come from the preset of the task. */
   trainer(agent: string, config: Config = {}): Trainer {
     return Trainer.create(this.#bridge, agent, config);
   }

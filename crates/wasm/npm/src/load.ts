@@ -5,12 +5,17 @@ import { relaxedFuses } from "./probe.js";
 /** Kind of vectors of a module: multiply-adds of relaxed SIMD, or exact emulation. The bits are the same. */
 export type Lanes = "relaxed" | "exact";
 
+/** What a module can do: everything, or all but training and the import of recordings in two thirds of the size. */
+export type Parts = "all" | "play";
+
 /** Options of `load`. */
 export interface LoadOptions {
-  /** Folder of `relaxed.wasm` and `exact.wasm`. Default: the folder of this script. */
+  /** Folder of the modules. Default: the folder of this script. */
   readonly base?: string | URL;
   /** Which module. Default: `relaxed` where a probe shows that this engine's products are rounded once. */
   readonly lanes?: Lanes;
+  /** Which parts. Default: `all`. */
+  readonly parts?: Parts;
   /** A module that another thread has compiled, `Marathon.module`. */
   readonly module?: WebAssembly.Module;
 }
@@ -25,7 +30,8 @@ export interface Loaded {
 /** Compiles and starts the module. */
 export async function instantiate(options: LoadOptions): Promise<Loaded> {
   const lanes = options.lanes ?? ((await relaxedFuses()) ? "relaxed" : "exact");
-  const module = options.module ?? (await compile(new URL(`${lanes}.wasm`, options.base ?? import.meta.url)));
+  const name = options.parts === "play" ? `${lanes}-play` : lanes;
+  const module = options.module ?? (await compile(new URL(`${name}.wasm`, options.base ?? import.meta.url)));
   const bridge = new Bridge(await WebAssembly.instantiate(module, {}));
   if (!bridge.exports.fuses()) {
     throw new MarathonError("the multiply-adds of this engine are rounded twice; load the exact module");

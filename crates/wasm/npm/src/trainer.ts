@@ -1,4 +1,5 @@
 import { type Bridge, Handle } from "./bridge.js";
+import { MarathonError } from "./error.js";
 import type { Config, Iteration } from "./types.js";
 
 /** A run in training. It has the bits of `marathon train` with the same settings. */
@@ -9,6 +10,9 @@ export class Trainer extends Handle {
 
   /** @internal Use `Marathon.trainer`. */
   static create(bridge: Bridge, agent: string, config: Config): Trainer {
+    if (!("training_new" in bridge.exports)) {
+      throw new MarathonError('this module is for play and has no training; load it with parts: "all"');
+    }
     const object = bridge.call((exports) => exports.training_new(), { agent, config });
     return new Trainer(bridge, object);
   }
