@@ -1,4 +1,4 @@
-//! `marathon serve` streams agents to whoever knows the token, and nobody holds it up.
+//! `marathon serve` streams agents to pages that know the token, and slow pages do not hold it up.
 
 mod common;
 
@@ -156,7 +156,7 @@ fn a_run_is_shown_from_its_first_checkpoint_on() {
     std::fs::rename(&aside, run.join("policy.safetensors")).expect("the policy");
     let scene: Value = serde_json::from_slice(&next(&mut stream, SCENE)).expect("JSON");
     assert_eq!(scene["title"], "Hopper-v0 after 8,192 decisions");
-    // a newer policy begins anew
+    // a newer policy starts new episodes
     std::fs::copy(policy(), run.join("policy.safetensors")).expect("the policy");
     let scene: Value = serde_json::from_slice(&next(&mut stream, SCENE)).expect("JSON");
     assert_ne!(scene["title"], "Hopper-v0 after 8,192 decisions");

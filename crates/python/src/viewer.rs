@@ -58,7 +58,7 @@ fn lock(shared: &Shared) -> MutexGuard<'_, Option<marathon_viewer::Viewer>> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What an environment keeps while it is shown.
+/// The state of an environment that is shown.
 pub struct Shown {
     shared: Shared,
     model: Arc<Model>,
@@ -146,7 +146,7 @@ impl Shown {
         Ok(())
     }
 
-    /// Shows the present states, if somebody looks and the last frame was long enough ago.
+    /// Shows the present states if a page is open and the last frame was long enough ago.
     fn show(&mut self, env: &VecEnv) -> PyResult<()> {
         let now = Instant::now();
         if self.last.is_some_and(|last| now - last < PERIOD) {

@@ -1,5 +1,5 @@
-//! From the program to the pages: each kind of message keeps only its newest one, so that a slow page misses frames and
-//! holds up nobody.
+//! From the program to the pages. Each kind of message keeps only its newest one, so a slow page misses frames and does not
+//! hold up the program.
 
 use super::frame::{ALIVE, message};
 use std::collections::BTreeMap;

@@ -9,8 +9,8 @@ use std::path::{Component, Path, PathBuf};
 /// Environment variable with the folder of the page.
 const VARIABLE: &str = "MARATHON_PAGE";
 
-/// Finds the folder of the page: the given one, or that in the environment variable `MARATHON_PAGE`, `page` beside the
-/// program, `share/marathon/page` above its folder, or `web/dist` of a checkout in the present folder.
+/// Finds the folder of the page. A given folder counts first, then the environment variable `MARATHON_PAGE`. Without them, it
+/// is `page` beside the program, `share/marathon/page` above its folder, or `web/dist` in the present folder.
 ///
 /// # Errors
 /// If it is in none of them.

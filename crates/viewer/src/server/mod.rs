@@ -25,7 +25,7 @@ const TOKEN: usize = 16;
 
 /// Shows simulations in the page at [`Viewer::url`], for this computer only, until it is dropped.
 ///
-/// Whoever knows the address can watch; it contains a random token. Nothing can be changed through it.
+/// The address contains a random token, and only pages with the token can watch. They cannot change anything.
 pub struct Viewer {
     address: SocketAddr,
     token: String,
@@ -71,7 +71,7 @@ impl Viewer {
         self.channel.is_watched()
     }
 
-    /// Describes what the next frames show. Pages begin anew. `title` names it, `model` is [`facts`](crate::facts) of its
+    /// Describes what the next frames show. Pages start over. `title` names it, `model` is [`facts`](crate::facts) of its
     /// model, and `dt` the seconds between two frames.
     pub fn show(&self, title: &str, model: &Value, agents: usize, dt: f64) {
         self.channel.show(frame::scene(title, model, agents, dt));
