@@ -8,12 +8,14 @@ use serde::{Deserialize, Serialize};
 
 mod actuator;
 mod coupling;
+mod hull;
 mod sensor;
 mod shape;
 mod view;
 
 pub use actuator::{Actuator, Dynamics, Transmission};
 pub use coupling::{Equality, EqualityKind, Tendon, TendonKind};
+pub use hull::Hull;
 pub use sensor::{Sensor, SensorObject, SensorType};
 pub use shape::{Geom, GeomType, HField, Pair, Site};
 pub use view::{Camera, Light, TrackMode};
@@ -54,6 +56,8 @@ pub struct Model {
     pub lights: Vec<Light>,
     /// Height fields (`<asset><hfield>`).
     pub hfields: Vec<HField>,
+    /// Convex hulls of the meshes that collide.
+    pub hulls: Vec<Hull>,
     /// Tendons.
     pub tendons: Vec<Tendon>,
     /// Equality constraints.

@@ -42,6 +42,8 @@ pub struct Geom {
     pub size: Vec3,
     /// Index of the height field, for [`GeomType::Hfield`].
     pub hfield: Option<usize>,
+    /// Index of the convex hull, for a [`GeomType::Mesh`] that collides.
+    pub hull: Option<usize>,
     /// Bit mask: the collision type of this geom.
     pub contype: u32,
     /// Bit mask: the types that this geom collides with.
