@@ -152,7 +152,7 @@ fn what_is_not_supported_is_refused_by_name() {
     for (content, parts) in [
         ("<geom size='1' adhesion='2'/>", &["attribute 'adhesion'", "'2' is not supported, only '0'"][..]),
         ("<geom size='1' shellinertia='true'/>", &["attribute 'shellinertia'", "only 'false'"]),
-        ("<geom type='sdf'/>", &["<geom> attribute 'type'", "meshes are not supported unless they neither collide"]),
+        ("<geom type='sdf'/>", &["<geom> attribute 'type'", "signed distance fields are not supported"]),
         ("<geom size='1'><plugin/></geom>", &["plugins are not supported"]),
         ("<joint springyield='1'/>", &["attribute 'springyield'"]),
         ("<replicate count='2'/>", &["<replicate>", "save the expanded model from MuJoCo"]),
@@ -214,14 +214,16 @@ fn what_is_not_supported_together() {
         with_section("<asset><mesh name='m' file='m.obj'/></asset>")
             .replace("<joint name=", &format!("{geom}<joint name="))
     };
-    let refused = &["bad.xml:4:", "attribute 'mesh'", "unless they neither collide"];
+    // a file may be missing if its mesh is only seen
+    let refused = &["bad.xml:8:", "mesh file 'm.obj': a model given as text has no other files"];
     check(&meshes("<geom type='mesh' mesh='m'/>"), refused);
     check(&meshes("<geom type='mesh' mesh='m' contype='0' conaffinity='0'/>"), refused);
+    check(&meshes("<geom type='mesh' mesh='m' mass='0'/>"), refused);
     check(&meshes("<geom type='box' mesh='m' contype='0' conaffinity='0' mass='0'/>"), refused);
     let shown = meshes("<geom name='m' type='mesh' mesh='m' contype='0' conaffinity='0' mass='0'/>");
     assert!(Model::from_xml_str(&shown, "good.xml").is_ok());
     let pair = shown.replace("<asset>", "<contact><pair geom1='g' geom2='m'/></contact><asset>");
-    check(&pair, &["<pair> attribute 'geom2'", "unless they neither collide"]);
+    check(&pair, &["<pair>: geom 'm' collides, but the file of its mesh is missing"]);
     let fish = with_section("<option density='1000'/>").replace("size=\"1\"", "size='1' fluidshape='ellipsoid'");
     check(&fish, &["bad.xml:4:", "attribute 'fluidshape'", "only fluidshape=\"none\""]);
     assert!(Model::from_xml_str(&fish.replace("1000", "0"), "good.xml").is_ok());
@@ -289,6 +291,64 @@ fn activations() {
     let key = "<keyframe><key act='1'/></keyframe>";
     check(&with_section(key), &["'act' is '1'"]);
     check(&with_section("<keyframe><key mpos='1 2 3'/></keyframe>"), &["'mpos' is '1 2 3'"]);
+}
+
+#[test]
+fn meshes() {
+    let files = |name: &str| match name {
+        "shapes/short.stl" => Ok(vec![0; 100]),
+        "shapes/huge.stl" => Ok([vec![0; 80], 10_000_000i32.to_le_bytes().to_vec()].concat()),
+        "shapes/bad.obj" => Ok(b"v 0 0 0\nv 1 0 zero\n".to_vec()),
+        "shapes/flat.obj" => Ok(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\n".to_vec()),
+        "shapes/thing.ply" => Ok(b"ply".to_vec()),
+        _ => Err("no such file".to_owned()),
+    };
+    let mistake = |mesh: &str, geom: &str, parts: &[&str]| {
+        let xml = format!(
+            "<mujoco><compiler meshdir='shapes'/>\n<asset>{mesh}</asset>\n<worldbody>{geom}</worldbody></mujoco>"
+        );
+        let message = Model::from_xml_str_with(&xml, "bad.xml", &files).unwrap_err().to_string();
+        for part in parts {
+            assert!(message.contains(part), "'{part}' is missing in {message}");
+        }
+    };
+    let shown = "<geom type='mesh' mesh='m'/>";
+    let file = |name: &str| format!("<mesh name='m' file='{name}'/>");
+    mistake(&file("none.stl"), shown, &["bad.xml:2:", "cannot read the file", "'shapes/none.stl': no such file"]);
+    mistake(&file("short.stl"), shown, &["'shapes/short.stl'", "byte 80: found 0 triangles, expected 1 to 200000"]);
+    mistake(&file("huge.stl"), shown, &["found 10000000 triangles"]);
+    mistake(&file("bad.obj"), shown, &["'shapes/bad.obj': line 2: found 'zero', expected a coordinate"]);
+    mistake(&file("thing.ply"), shown, &["ends with .stl, .obj or .msh"]);
+    mistake(&file("flat.obj"), shown, &["<mesh name=\"m\">: its volume is 0e0", "inertia=\"shell\""]);
+    mistake(&file("flat.obj").replace("/>", " inertia='shell'/>"), shown, &["all vertices are in one plane"]);
+    mistake("<mesh name='m' content_type='a/b' file='bad.obj'/>", shown, &["content type 'a/b'"]);
+    mistake("<mesh name='m'/>", shown, &["'file', 'builtin' or 'vertex' is missing"]);
+    mistake("<mesh name='m' file='bad.obj' vertex='0 0 0'/>", shown, &["only one of 'file', 'builtin' and 'vertex'"]);
+    mistake("<mesh name='m' vertex='0 0 0 1'/>", shown, &["'vertex' is '0 0 0 1'", "groups of three", "4 numbers"]);
+    mistake("<mesh name='m' vertex='0 nan 0'/>", shown, &["finite numbers, not 'nan'"]);
+    mistake("<mesh name='m' vertex='0 0 0'/>", shown, &["found 1 vertices, expected at least 4"]);
+    let tetrahedron = "<mesh name='m' vertex='0 0 0 1 0 0 0 1 0 0 0 1'/>";
+    let with = |attributes: &str| tetrahedron.replace("/>", &format!(" {attributes}/>"));
+    mistake(&with("face='0 1 4'"), shown, &["face 0 is [0, 1, 4], but there are only 4 vertices"]);
+    mistake(&with("face='0 1 -1'"), shown, &["vertices, counted from 0, not '-1'"]);
+    let inward = "face='0 1 2 0 3 1 1 3 2 2 3 0'";
+    mistake(&with(&format!("{inward} inertia='exact'")), shown, &["volume is -", "triangles face inward"]);
+    mistake(
+        &with("face='0 2 1 0 1 3 1 2 3 2 3 0' inertia='exact'"),
+        shown,
+        &["two faces run from vertex 0 to vertex 2"],
+    );
+    mistake(&with("maxhullvert='3'"), shown, &["maxhullvert is 3, expected -1 or at least 4"]);
+    mistake(&with("inertia='solid'"), shown, &["one of convex, exact, legacy, shell"]);
+    mistake(&with("scale='1e300 1e300 1e300'"), shown, &["<mesh name=\"m\">"]);
+    mistake(&with("vertx='1'"), shown, &["has no attribute 'vertx'", "did you mean 'vertex'?"]);
+    mistake("<mesh name='m' builtin='plate' params='1 1'/>", shown, &["only sphere, hemisphere, cone"]);
+    mistake("<mesh name='m' builtin='sphere' params='9'/>", shown, &["'params' is [9.0]", "0 to 4"]);
+    mistake("<mesh name='m' builtin='sphere'/>", shown, &["'params' is missing"]);
+    mistake(tetrahedron, "<geom type='mesh'/>", &["bad.xml:3:", "a mesh needs the attribute 'mesh'"]);
+    mistake(tetrahedron, "<geom type='mesh' mesh='n'/>", &["there is no mesh 'n'", "did you mean 'm'?"]);
+    mistake(tetrahedron, "<geom type='plane' mesh='m'/>", &["can be fitted by a sphere"]);
+    mistake(tetrahedron, "<geom type='capsule' mesh='m' fromto='0 0 0 1 0 0'/>", &["'fromto' does not go with a mesh"]);
 }
 
 #[test]
