@@ -1,7 +1,7 @@
 //! A compiled mesh is MuJoCo's compiled mesh.
 //!
-//! Random meshes are written to files of every format: globes, prisms, boxes with points on their sides, and clouds; turned, scaled,
-//! mirrored, with reference frames and with every rule of inertia. Masses, centers, inertias and frames agree to 1e-12, the boxes
+//! Random meshes are written to files of every format: globes, prisms, boxes with points on their sides, and clouds. They are
+//! turned, scaled and mirrored, with reference frames and with every rule of inertia. Masses, centers, inertias and frames agree to 1e-12, the boxes
 //! of geoms to a rounding error. Vertices are the same single precision numbers but for the last bit. Hulls have the same
 //! corners and the same polygons.
 

@@ -10,8 +10,10 @@ use crate::model::Vec3;
 use std::collections::BinaryHeap;
 
 const NONE: u32 = u32::MAX;
-/// Most tests of a point against a face: a few seconds.
-const MOST_WORK: u64 = 600_000_000;
+/// Most tests of a point against a face: about a second.
+const MOST_WORK: u64 = 300_000_000;
+/// Most corners.
+const MOST_CORNERS: usize = 1 << 17;
 /// Smaller distances count as zero (MuJoCo's `mjMINVAL`).
 const SMALLEST: f64 = 1e-15;
 
@@ -96,6 +98,9 @@ pub(super) fn triangles(vertices: &[[f32; 3]], grid: &Grid, most: Option<usize>)
         let Some(face) = hull.farthest() else { break };
         hull.add(face)?;
         points += 1;
+        if points > MOST_CORNERS {
+            return Err(format!("its convex hull has more than {MOST_CORNERS} corners; limit them with maxhullvert"));
+        }
     }
     Ok(hull.faces.iter().filter(|f| f.alive).map(|f| f.corners).collect())
 }

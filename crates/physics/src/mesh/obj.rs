@@ -1,7 +1,7 @@
 //! Wavefront OBJ: the vertices of the file and the faces of its first object.
 //!
-//! The rules are those of the reader in MuJoCo (tinyobjloader 2): negative indices count from the last vertex, quads are
-//! cut along the shorter diagonal, and the ears of larger polygons are cut off one by one. Materials, normals, texture coordinates,
+//! The rules are those of the reader in MuJoCo (tinyobjloader 2). Negative indices count from the last vertex. Quads are
+//! cut along the shorter diagonal, and larger polygons lose one ear after the other. Materials, normals, texture coordinates,
 //! lines and points are ignored.
 
 use super::{MAX_FACES, MAX_VERTICES, Triangles, too_many};

@@ -1,7 +1,7 @@
 //! `<mesh>`: a mesh in the frame of its principal axes, what it weighs, and the primitives that are fitted to it.
 //!
-//! The order is MuJoCo's: the hull is found in the file's frame; then `refpos`, `refquat` and `scale` apply, the mesh moves to its
-//! center of mass and turns to its principal axes, and its points are rounded to single precision.
+//! The order is MuJoCo's. The hull is found in the file's frame. Then `refpos`, `refquat` and `scale` apply, and the mesh moves to its
+//! center of mass and turns to its principal axes. At last its points are rounded to single precision.
 
 use super::document::Element;
 use super::error::{MjcfError, MjcfErrorKind};

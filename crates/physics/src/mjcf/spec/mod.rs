@@ -45,7 +45,7 @@ mod write;
 pub use body_parts::{Body, Geom, Joint, Site};
 pub use element::{ElementMut, ElementRef};
 pub use kind::Kind;
-pub use model_parts::{Actuator, ContactExclude, Equality, HField, Keyframe, Sensor, Tendon};
+pub use model_parts::{Actuator, ContactExclude, Equality, HField, Keyframe, Mesh, Sensor, Tendon};
 pub use part::{BodyPart, ModelPart, Part};
 pub use value::AttrValue;
 
@@ -224,7 +224,7 @@ impl ModelSpec {
         }
     }
 
-    /// Adds a part behind all others of its section: a height field, tendon, constraint, actuator, sensor or keyframe.
+    /// Adds a part behind all others of its section: a height field, mesh, tendon, constraint, actuator, sensor or keyframe.
     ///
     /// # Errors
     /// If its name is taken, or it has an attribute that MJCF does not have.
