@@ -2,7 +2,7 @@
 
 Reads {"folder": path, "seed": s, "count": n} from standard input, writes meshes and models to the folder, and prints
 {"models": [{"path": .., "model": as in compiled_model.py, "meshes": [..], "hulls": [..], "bounds": [..]}]}:
-    meshes: vertices and faces by name
+    meshes: vertices and faces by name, without those that have very many
     hulls: of each geom, the corners of its polygons and their normals, or null
     bounds: of each geom, center and half lengths of its box, and the radius around its origin
 With {"paths": [..]} it prints the same for these models instead.
@@ -19,6 +19,8 @@ import numpy as np
 from compiled_model import dump
 
 MODES = ["legacy", "exact", "convex", "shell"]
+# vertices of a mesh that is printed
+LARGEST = 5000
 FORMATS = ["stl", "obj", "msh", "inline", "points"]
 
 
@@ -171,6 +173,8 @@ def described(path):
         vertices = m.mesh_vert[m.mesh_vertadr[i] :][: m.mesh_vertnum[i]]
         faces = m.mesh_face[m.mesh_faceadr[i] :][: m.mesh_facenum[i]]
         name = mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_MESH, i)
+        if len(vertices) > LARGEST:
+            continue
         meshes[name] = {"vertices": vertices.tolist(), "faces": faces.tolist()}
     bounds = [[*m.geom_aabb[g].tolist(), float(m.geom_rbound[g])] for g in range(m.ngeom)]
     hulls = [hull(m, g) for g in range(m.ngeom)]
