@@ -3,7 +3,7 @@
 
     fuzz/run.py [--seconds 600] [TARGET ...]
 
-Targets are `mjcf`, `batch`, `mlagents`, and the readers `motion-0` to `motion-4` and `files-0` to `files-7`. New inputs
+Targets are `mjcf`, `mesh`, `batch`, `mlagents`, and the readers `motion-0` to `motion-4` and `files-0` to `files-7`. New inputs
 go to corpus/TARGET, inputs that fail to artifacts/TARGET-..., and an interrupted run continues from the corpus. Prints
 a row per target; the exit code is 1 if one failed. Needs a C++ compiler.
 """
@@ -32,6 +32,7 @@ MODELS = [
 # target: program, environment, largest input, seconds for one input, seeds and further arguments
 TARGETS = {
     "mjcf": ("mjcf", {}, 8192, 20, [*map(str, MODELS), f"-dict={HERE / 'mjcf.dict'}"]),
+    "mesh": ("mesh", {}, 8192, 20, []),
     "batch": ("batch", {}, 2048, 30, []),
     "mlagents": ("mlagents", {}, 4096, 10, []),
     **{f"motion-{i}": ("motion", {"MOTION_READER": str(i)}, 8192, 10, []) for i in range(5)},

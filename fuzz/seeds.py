@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Writes seeds for the targets `motion` and `files`: small files of each format, with a byte before them, in corpus/motion-0 to -4
-and corpus/files-0 to -7.
+"""Writes seeds for the targets `mesh`, `motion` and `files`: small files of each format, with a byte or two before them, in corpus/mesh,
+corpus/motion-0 to -4 and corpus/files-0 to -7.
 
 The fuzzer rarely finds a whole file of a format by itself, but it can change one. The script needs no packages. Networks,
 demonstrations, tables and descriptions need the program, in target/release or CARGO_TARGET_DIR.
@@ -191,8 +191,28 @@ def descriptions(runs, name):
         yield json.dumps(document, indent=1)
 
 
+def meshes():
+    """A tetrahedron and a cube with quads, in each format and with each rule of inertia."""
+    points = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+    faces = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]
+    stl = bytes(80) + struct.pack("<i", 4)
+    stl += b"".join(struct.pack("<12f2x", 0, 0, 0, *points[a], *points[b], *points[c]) for a, b, c in faces)
+    flat = [x for row in points for x in row], [i for row in faces for i in row]
+    msh = struct.pack("<4i12f12i", 4, 0, 0, 4, *flat[0], *flat[1])
+    corners = "".join(f"v {x} {y} {z}\n" for x in (-1, 1) for y in (-1, 1) for z in (-1, 1.5))
+    quads = ["1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "-7 -3 -1/1 -5//2"]
+    obj = (corners + "o cube\n" + "".join(f"f {quad}\n" for quad in quads)).encode()
+    for form, data in enumerate([stl, obj, msh]):
+        for rule in range(4):
+            yield bytes([form, rule]) + data
+
+
 def main():
     """Writes all seeds."""
+    folder = HERE / "corpus/mesh"
+    folder.mkdir(parents=True, exist_ok=True)
+    for i, seed in enumerate(meshes()):
+        (folder / f"seed-{i}").write_bytes(seed)
     write("motion", [clips(), bvh(), deep_mimic(), glb(), mappings()])
     with tempfile.TemporaryDirectory() as folder:
         runs = Path(folder)

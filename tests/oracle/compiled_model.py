@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 JOINTS = ["Free", "Ball", "Slide", "Hinge"]
-SHAPES = ["Plane", "Hfield", "Sphere", "Capsule", "Ellipsoid", "Cylinder", "Box", "Mesh"]
+SHAPES = ["Plane", "Hfield", "Sphere", "Capsule", "Ellipsoid", "Cylinder", "Box", "Mesh", "Sdf"]
 MODES = ["Fixed", "Track", "TrackCom", "TargetBody", "TargetBodyCom"]
 INTEGRATORS = {0: "Euler", 1: "Rk4", 2: "Implicit", 3: "ImplicitFast"}
 CONES = ["Pyramidal", "Elliptic"]
@@ -122,12 +122,11 @@ def dof(m, i):
 
 def geom(m, i):
     material = m.geom_matid[i]
-    # a mesh is not read, so its size and principal axes are not known
-    kind, mesh = SHAPES[m.geom_type[i]], m.geom_type[i] == mujoco.mjtGeom.mjGEOM_MESH
+    kind = SHAPES[m.geom_type[i]]
     return {
         "name": name(m, mujoco.mjtObj.mjOBJ_GEOM, i), "kind": kind, "body": m.geom_bodyid[i],
-        "pos": None if mesh else m.geom_pos[i], "quat": None if mesh else m.geom_quat[i],
-        "size": None if mesh else m.geom_size[i], "hfield": m.geom_dataid[i] if kind == "Hfield" else "none",
+        "pos": m.geom_pos[i], "quat": m.geom_quat[i], "size": m.geom_size[i],
+        "hfield": m.geom_dataid[i] if kind == "Hfield" else "none",
         "contype": int(m.geom_contype[i]) % 2**32, "conaffinity": int(m.geom_conaffinity[i]) % 2**32,
         "condim": m.geom_condim[i], "priority": m.geom_priority[i], "friction": m.geom_friction[i],
         "solmix": m.geom_solmix[i], "solref": m.geom_solref[i], "solimp": m.geom_solimp[i],
@@ -261,7 +260,7 @@ def sensor_object(kind, i):
 
 def sensor(m, i):
     kind = mujoco.mjtSensor(m.sensor_type[i]).name.removeprefix("mjSENS_")
-    # strings through sites and meshes are not read
+    # readings of strings through sites and of meshes are not computed
     ends = [(m.sensor_objtype[i], m.sensor_objid[i]), (m.sensor_reftype[i], m.sensor_refid[i])]
     mesh = any(t == mujoco.mjtObj.mjOBJ_GEOM and m.geom_type[k] == mujoco.mjtGeom.mjGEOM_MESH for t, k in ends)
     string = any(
@@ -305,7 +304,6 @@ def dump(m):
     def each(function, count):
         return [function(m, i) for i in range(count)]
 
-    meshes = any(m.geom_type == mujoco.mjtGeom.mjGEOM_MESH)
     return {
         "name": bytes(m.names).split(b"\0")[0].decode(), "opt": options(m), "nq": m.nq, "nv": m.nv, "nu": m.nu,
         "na": m.na, "hfields": each(hfield, m.nhfield), "tendons": each(tendon, m.ntendon),
@@ -317,7 +315,7 @@ def dump(m):
         "numerics": each(numeric, m.nnumeric), "qpos0": m.qpos0, "qpos_spring": m.qpos_spring,
         "stat": {
             "mean_inertia": m.stat.meaninertia, "mean_mass": m.stat.meanmass,
-            "extent": None if meshes else m.stat.extent, "center": None if meshes else m.stat.center,
+            "extent": m.stat.extent, "center": m.stat.center,
         },
     }
 

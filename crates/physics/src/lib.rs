@@ -17,6 +17,7 @@
 //! | `algebra` | vectors, rotations, spatial vectors and inertias |
 //! | `model` | the compiled model, MuJoCo's `mjModel` |
 //! | `geometry` | contacts of two shapes |
+//! | `mesh` | mesh files, their mass and their convex hulls |
 //! | `mjcf` | from an MJCF file to a model |
 //! | `sim` | the constants of a model as the kernels see them, in lane precision |
 //! | `rows` | constraint rows: their values, costs and forces |
@@ -40,6 +41,7 @@ mod algebra;
 pub mod model;
 
 mod geometry;
+mod mesh;
 pub mod mjcf;
 
 mod sim;

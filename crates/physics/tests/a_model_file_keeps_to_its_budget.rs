@@ -103,6 +103,52 @@ fn includes_share_one_budget() {
     std::fs::remove_dir_all(folder).unwrap();
 }
 
+/// Mesh files whose numbers ask for much, or whose hull would take long.
+#[test]
+fn meshes_are_bounded() {
+    let load = |file: &str, bytes: &[u8]| {
+        let begun = Instant::now();
+        let text = format!(
+            "<mujoco><asset><mesh name='m' file='{file}' inertia='convex'/></asset><worldbody><geom type='mesh' \
+             mesh='m'/></worldbody></mujoco>"
+        );
+        let result = Model::from_xml_str_with(&text, "mesh", &|_| Ok(bytes.to_vec())).map_err(|e| e.to_string());
+        assert!(begun.elapsed() < LONGEST, "{file}: {:?}", begun.elapsed());
+        result
+    };
+    let refused = |file: &str, bytes: &[u8], expected: &str| {
+        let error = load(file, bytes).expect_err(file);
+        assert!(error.contains(file) || error.contains("<mesh"), "{error}");
+        assert!(error.contains(expected), "{error}");
+    };
+    let triangles = 10_000_000i32;
+    let stl = [vec![0; 80], triangles.to_le_bytes().to_vec()].concat();
+    refused("huge.stl", &stl, "found 10000000 triangles, expected 1 to 200000");
+    let msh = [4, 0, 0, triangles].map(i32::to_le_bytes).concat();
+    refused("huge.msh", &msh, "found 10000000 faces, expected at most 1048576");
+    let nan = [vec![0; 80], 1i32.to_le_bytes().to_vec(), f32::NAN.to_le_bytes().repeat(12), vec![0; 2]].concat();
+    refused("nan.stl", &nan, "expected finite numbers");
+    let faces = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n{}", "f 1 2 3\n".repeat(4_000_000));
+    refused("faces.obj", faces.as_bytes(), "faces, expected at most 1048576");
+    let polygon = format!("v 0 0 0\nf{}\n", " 1".repeat(2_000_000));
+    refused("polygon.obj", polygon.as_bytes(), "corners of a face, expected at most 1000");
+    let vertices = "v 1 2 3\n".repeat(2_000_000);
+    refused("vertices.obj", vertices.as_bytes(), "vertices, expected at most 1048576");
+    let empty = "v 1 2 3\n".repeat(1_000_000);
+    refused("same.obj", empty.as_bytes(), "the same point");
+    // every point is a corner of the hull
+    let spiral = |i: usize| {
+        let z = 1.0 - 2.0 * (i as f64 + 0.5) / 400_000.0;
+        let (r, angle) = ((1.0 - z * z).sqrt(), 2.399963 * i as f64);
+        format!("v {:.7} {:.7} {z:.7}\n", r * angle.cos(), r * angle.sin())
+    };
+    refused("ball.obj", repeat(400_000, spiral).as_bytes(), "more than 131072 corners; limit them with maxhullvert");
+    assert!(
+        load("grid.obj", repeat(500_000, |i| format!("v {} {} {}\n", i % 80, i / 80 % 80, i / 6400)).as_bytes())
+            .is_ok()
+    );
+}
+
 /// The pairs of geoms that may touch grow with the square of a file's size, and so does the time to find them.
 #[test]
 fn a_simulation_keeps_to_the_budget_of_its_model() {

@@ -450,3 +450,19 @@ fn an_edited_model_keeps_to_the_budget() {
     assert!(error.is_some_and(|e| e.to_string().contains("nested more than 200 deep")));
     assert!(ModelSpec::from_xml_str(&spec.to_xml(), "deep").is_ok());
 }
+
+#[test]
+fn meshes_are_parts() {
+    let points = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+    let mut spec = ModelSpec::new("wedge");
+    spec.add(Mesh::points("wedge", &points).scale([0.1, 0.1, 0.2])).unwrap();
+    spec.add_to("world", Body::new("b")).unwrap();
+    spec.add_to("b", Joint::free()).unwrap();
+    spec.add_to("b", Geom::mesh("wedge").name("g")).unwrap();
+    let model = spec.compile().unwrap();
+    assert_eq!((model.meshes.len(), model.hulls[0].polygons.len(), model.geoms[0].hull), (1, 4, Some(0)));
+    assert!((model.bodies[1].mass - 1000.0 * 0.002 / 6.0).abs() < 1e-9);
+    let written = Model::from_xml_str(&spec.to_xml(), "wedge").unwrap();
+    assert!(written == model);
+    assert_eq!(spec.remove(Kind::Mesh, "wedge").unwrap(), ["<geom name=\"g\">"]);
+}

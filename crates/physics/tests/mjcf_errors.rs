@@ -152,7 +152,7 @@ fn what_is_not_supported_is_refused_by_name() {
     for (content, parts) in [
         ("<geom size='1' adhesion='2'/>", &["attribute 'adhesion'", "'2' is not supported, only '0'"][..]),
         ("<geom size='1' shellinertia='true'/>", &["attribute 'shellinertia'", "only 'false'"]),
-        ("<geom type='sdf'/>", &["<geom> attribute 'type'", "meshes are not supported unless they neither collide"]),
+        ("<geom type='sdf'/>", &["<geom> attribute 'type'", "signed distance fields are not supported"]),
         ("<geom size='1'><plugin/></geom>", &["plugins are not supported"]),
         ("<joint springyield='1'/>", &["attribute 'springyield'"]),
         ("<replicate count='2'/>", &["<replicate>", "save the expanded model from MuJoCo"]),
@@ -214,14 +214,16 @@ fn what_is_not_supported_together() {
         with_section("<asset><mesh name='m' file='m.obj'/></asset>")
             .replace("<joint name=", &format!("{geom}<joint name="))
     };
-    let refused = &["bad.xml:4:", "attribute 'mesh'", "unless they neither collide"];
+    // a file may be missing if its mesh is only seen
+    let refused = &["bad.xml:8:", "mesh file 'm.obj': a model given as text has no other files"];
     check(&meshes("<geom type='mesh' mesh='m'/>"), refused);
     check(&meshes("<geom type='mesh' mesh='m' contype='0' conaffinity='0'/>"), refused);
+    check(&meshes("<geom type='mesh' mesh='m' mass='0'/>"), refused);
     check(&meshes("<geom type='box' mesh='m' contype='0' conaffinity='0' mass='0'/>"), refused);
     let shown = meshes("<geom name='m' type='mesh' mesh='m' contype='0' conaffinity='0' mass='0'/>");
     assert!(Model::from_xml_str(&shown, "good.xml").is_ok());
     let pair = shown.replace("<asset>", "<contact><pair geom1='g' geom2='m'/></contact><asset>");
-    check(&pair, &["<pair> attribute 'geom2'", "unless they neither collide"]);
+    check(&pair, &["<pair>: geom 'm' collides, but the file of its mesh is missing"]);
     let fish = with_section("<option density='1000'/>").replace("size=\"1\"", "size='1' fluidshape='ellipsoid'");
     check(&fish, &["bad.xml:4:", "attribute 'fluidshape'", "only fluidshape=\"none\""]);
     assert!(Model::from_xml_str(&fish.replace("1000", "0"), "good.xml").is_ok());

@@ -1,9 +1,9 @@
 //! From the parts of the file to the [`Model`].
 
-use super::asset::ReadFile;
 use super::defaults::{ACTUATORS, Defaults};
 use super::document::Element;
 use super::error::MjcfError;
+use super::file::ReadFile;
 use super::geom::GeomSpec;
 use super::joint::JointSpec;
 use super::math::{Frame, IDENTITY, MIN_VAL};
@@ -13,7 +13,7 @@ use super::settings::{Settings, entries};
 use super::tree::{BodySpec, CameraSpec, LightSpec, SiteSpec};
 use super::value::Attrs;
 use super::{
-    actuator, asset, contact, custom, equality, geom, inertia, mass_matrix, schema, sensor, settings, statistics,
+    actuator, asset, contact, custom, equality, geom, inertia, mass_matrix, mesh, schema, sensor, settings, statistics,
     tendon, tree,
 };
 use crate::hint::{did_you_mean, nearest};
@@ -30,7 +30,7 @@ pub(crate) fn compile(root: &Element, file: &ReadFile, room: &Room) -> Result<Mo
     let defaults = Defaults::read(root, room)?;
     check_defaults(&defaults, &settings)?;
 
-    let assets = asset::read(root, &settings, file, room)?;
+    let assets = asset::read(root, &defaults, &settings, file, room)?;
     let mut bodies = tree::read(root, &defaults, &settings, &assets)?;
     inertia::compile(&mut bodies, &settings)?;
     let materials = materials(root, &defaults)?;
@@ -49,6 +49,8 @@ pub(crate) fn compile(root: &Element, file: &ReadFile, room: &Room) -> Result<Mo
         cameras: Vec::new(),
         lights: Vec::new(),
         hfields: Vec::new(),
+        meshes: Vec::new(),
+        hulls: Vec::new(),
         tendons: Vec::new(),
         equalities: Vec::new(),
         actuators: Vec::new(),
@@ -75,6 +77,7 @@ pub(crate) fn compile(root: &Element, file: &ReadFile, room: &Room) -> Result<Mo
     model.tendons = tendon::compile(root, &defaults, &names, &settings, &model)?;
     model.pairs = contact::pairs(root, &defaults, &names, &model.geoms)?;
     model.excludes = contact::excludes(root, &names)?;
+    mesh::add(&mut model, &assets.meshes, room)?;
     actuator::compile(root, &defaults, &names, &settings, &mut model)?;
     model.sensors = sensor::compile(root, &names, &model, room)?;
     model.keyframes = custom::keyframes(root, &model, room)?;
@@ -327,6 +330,8 @@ fn convert_geom(spec: &GeomSpec, body: usize, materials: &BTreeMap<&str, Option<
         quat: spec.shape.frame.quat,
         size: spec.shape.size,
         hfield: spec.shape.hfield,
+        hull: None,
+        mesh: spec.shape.solid.map(|solid| solid.mesh),
         contype: spec.surface.contype,
         conaffinity: spec.surface.conaffinity,
         condim: spec.surface.condim,

@@ -1,16 +1,16 @@
-//! `<asset>`: height fields, and the names of meshes.
+//! `<asset>`: height fields and meshes.
 
+use super::defaults::Defaults;
 use super::document::Element;
 use super::error::MjcfError;
+use super::file::ReadFile;
 use super::math::EPS;
+use super::mesh::{self, MeshAsset};
 use super::names::Names;
 use super::room::Room;
 use super::settings::{Settings, entries};
 use super::value::{Attrs, numbers};
 use crate::model::HField;
-
-/// Reads a file that the model refers to, given its path relative to the model.
-pub(crate) type ReadFile<'a> = dyn Fn(&str) -> Result<Vec<u8>, String> + 'a;
 
 /// A grid with more points than this is a mistake in the file.
 const MAX_POINTS: usize = 1 << 24;
@@ -21,13 +21,16 @@ pub(crate) struct Assets<'a> {
     pub hfields: Vec<HField>,
     /// Their names.
     pub hfield_names: Names<'a>,
-    /// Names of meshes; their files are not read.
+    /// Meshes in document order.
+    pub meshes: Vec<MeshAsset<'a>>,
+    /// Their names.
     pub mesh_names: Names<'a>,
 }
 
-/// Reads all height fields.
+/// Reads all height fields, and all meshes that geoms refer to.
 pub(crate) fn read<'a>(
     root: &'a Element,
+    defaults: &'a Defaults<'a>,
     settings: &Settings,
     file: &ReadFile,
     room: &Room,
@@ -39,11 +42,15 @@ pub(crate) fn read<'a>(
         hfield_names.add_as(name, element, i)?;
         hfields.push(hfield(element, name, settings, file, room)?);
     }
-    let mut mesh_names = Names::new("mesh");
+    let (mut meshes, mut mesh_names) = (Vec::new(), Names::new("mesh"));
+    let used = mesh::used(root);
     for (i, element) in of_kind("mesh").enumerate() {
-        mesh_names.add_as(asset_name(element)?, element, i)?;
+        let name = asset_name(element)?;
+        mesh_names.add_as(name, element, i)?;
+        let attrs = defaults.attrs(element, None)?;
+        meshes.push(MeshAsset::read(&attrs, name, used.contains(name), settings, file, room)?);
     }
-    Ok(Assets { hfields, hfield_names, mesh_names })
+    Ok(Assets { hfields, hfield_names, meshes, mesh_names })
 }
 
 /// The name that an asset gives itself, else that of its file without folder and extension.
@@ -89,7 +96,7 @@ fn hfield(
                 let kind = super::error::MjcfErrorKind::Read(format!("height field file '{path}': {reason}"));
                 attr.place.error(kind)
             };
-            let bytes = read(&path).map_err(failed)?;
+            let bytes = read(&path).map_err(|e| failed(e.reason))?;
             let is_png = match element.text("content_type") {
                 Some(kind) => kind == "image/png",
                 None => attr.value.to_ascii_lowercase().ends_with(".png"),

@@ -3,7 +3,6 @@
 use super::defaults::Defaults;
 use super::document::Element;
 use super::error::MjcfError;
-use super::geom::NO_MESH;
 use super::names::{Names, Registry};
 use super::settings::entries;
 use super::solver_params::{SOLIMP, SOLREF};
@@ -45,8 +44,10 @@ pub(crate) fn pairs(
     for element in elements() {
         let mut pair = parameters(&defaults.attrs(element, None)?)?;
         pair.geoms = [names.geoms.required(element, "geom1")?, names.geoms.required(element, "geom2")?];
-        if let Some(i) = (0..2).find(|&i| geoms[pair.geoms[i]].kind == GeomType::Mesh) {
-            return Err(element.unsupported(Some(["geom1", "geom2"][i]), NO_MESH));
+        let missing = |g: &usize| geoms[*g].kind == GeomType::Mesh && geoms[*g].mesh.is_none();
+        if let Some(geom) = pair.geoms.iter().find(|g| missing(g)) {
+            let name = &geoms[*geom].name;
+            return Err(element.invalid(format!("geom '{name}' collides, but the file of its mesh is missing")));
         }
         if geoms[pair.geoms[0]].body > geoms[pair.geoms[1]].body {
             pair.geoms.reverse();

@@ -4,6 +4,7 @@ use super::asset::Assets;
 use super::document::Element;
 use super::error::MjcfError;
 use super::math::*;
+use super::mesh::{Content, MeshAsset};
 use super::orientation::orientation;
 use super::settings::Settings;
 use super::solver_params::{SOLIMP, SOLREF};
@@ -23,9 +24,7 @@ const TYPES: [(&str, Option<GeomType>); 9] = [
     ("sdf", None),
 ];
 
-/// Why a mesh is refused.
-pub(crate) const NO_MESH: &str = "meshes are not supported unless they neither collide (contype and conaffinity 0) nor \
-                                  weigh; use a capsule, box, sphere, cylinder or ellipsoid";
+const NO_SDF: &str = "signed distance fields are not supported; type=\"mesh\" collides as the convex hull";
 
 /// Color of shapes that give neither color nor material.
 const GRAY: [f32; 4] = [0.5, 0.5, 0.5, 1.0];
@@ -37,9 +36,22 @@ pub(crate) struct ShapeSpec {
     pub size: Vec3,
     /// Height field that it shows.
     pub hfield: Option<usize>,
+    /// Mesh that it shows, if its file was found.
+    pub solid: Option<ShownMesh>,
     /// Color of its own, if it differs from the default.
     pub rgba: [f32; 4],
     pub group: i32,
+}
+
+/// The mesh of a geom.
+#[derive(Clone, Copy)]
+pub(crate) struct ShownMesh {
+    /// Number of the asset.
+    pub mesh: usize,
+    /// Volume, or area of a shell.
+    volume: f64,
+    /// Half lengths of a box with the same inertia.
+    inertia_box: Vec3,
 }
 
 /// A geom as the file describes it.
@@ -48,6 +60,8 @@ pub(crate) struct GeomSpec<'a> {
     pub shape: ShapeSpec,
     pub surface: Surface,
     pub material: Option<&'a str>,
+    /// Why its mesh is missing.
+    missing: Option<MjcfError>,
     pub mass: Option<f64>,
     pub density: f64,
 }
@@ -105,7 +119,7 @@ impl GeomSpec<'_> {
         attrs: &Attrs<'a>,
         outer: &Frame,
         settings: &Settings,
-        assets: &Assets,
+        assets: &Assets<'a>,
     ) -> Result<GeomSpec<'a>, MjcfError> {
         let ellipsoid = attrs.keyword("fluidshape", &[("none", false), ("ellipsoid", true)])?.unwrap_or(false);
         if let Some((element, _)) = attrs.find("fluidshape").filter(|_| ellipsoid && settings.medium) {
@@ -114,14 +128,22 @@ impl GeomSpec<'_> {
         }
         let shape = ShapeSpec::read(attrs, outer, settings, [0.0; 3], Some(assets))?;
         let surface = Surface::read(attrs)?;
-        if shape.kind == GeomType::Mesh && (surface.contype != 0 || surface.conaffinity != 0) {
-            return Err(attrs.element.unsupported(Some("mesh"), NO_MESH));
+        let asset = attrs.text("mesh").and_then(|name| assets.mesh_names.get(name)).map(|i| &assets.meshes[i]);
+        let missing = asset.and_then(|asset| match &asset.content {
+            Content::Missing(error) => Some(error.clone()),
+            Content::Unused | Content::Solid(_) => None,
+        });
+        match missing {
+            Some(error) if surface.contype != 0 || surface.conaffinity != 0 => return Err(error),
+            _ => {}
         }
+        let inherited = asset.filter(|_| shape.kind == GeomType::Mesh).and_then(|asset| asset.material);
         Ok(GeomSpec {
             element: attrs.element,
             shape,
             surface,
-            material: attrs.text("material"),
+            material: attrs.text("material").or(inherited),
+            missing,
             mass: attrs.array::<1>("mass")?.map(|m| m[0]),
             density: attrs.number_or("density", 1000.0)?,
         })
@@ -129,8 +151,9 @@ impl GeomSpec<'_> {
 
     /// Mass and principal moments in the geom's own frame.
     pub fn mass_and_inertia(&self) -> Result<(f64, Vec3), MjcfError> {
-        if self.shape.kind == GeomType::Mesh && self.mass.unwrap_or(self.density) != 0.0 {
-            return Err(self.element.unsupported(Some("mesh"), NO_MESH));
+        match &self.missing {
+            Some(error) if self.mass.unwrap_or(self.density) != 0.0 => return Err(error.clone()),
+            _ => {}
         }
         let volume = self.shape.volume();
         let mass = match self.mass {
@@ -182,13 +205,14 @@ impl ShapeSpec {
         let element = attrs.element;
         let values = ShapeValues::read(attrs, settings, size)?;
         let Some(kind) = values.kind else {
-            return Err(element.unsupported(Some("type"), NO_MESH));
+            return Err(element.unsupported(Some("type"), NO_SDF));
         };
-        let (mut size, mut hfield) = (values.size, None);
+        let (mut size, mut hfield, mut mesh) = (values.size, None, None);
         let on_asset = matches!(kind, GeomType::Hfield | GeomType::Mesh);
         match assets {
             Some(assets) => {
-                hfield = shown_asset(attrs, kind, assets)?;
+                hfield = shown_field(attrs, kind, assets)?;
+                mesh = shown_mesh(attrs, kind, assets)?;
                 if let Some(hfield) = hfield {
                     let [x, y, top, base] = assets.hfields[hfield].size;
                     size = [x, y, 0.25 * top + 0.5 * base];
@@ -204,15 +228,18 @@ impl ShapeSpec {
             Some(_) if values.pos != [0.0; 3] => {
                 return Err(element.invalid("there are both 'pos' and 'fromto'"));
             }
+            Some(_) if mesh.is_some() => return Err(element.invalid("'fromto' does not go with a mesh")),
             Some(ends) => from_to(element, kind, ends, &mut size)?,
         };
-        if kind == GeomType::Mesh {
-            // its extent is unknown
-            size = [0.0; 3];
-        } else {
+        let (frame, solid) = match mesh {
+            Some((index, asset)) => on_mesh(attrs, kind, index, asset, settings, &local, &mut size)?,
+            None => (local, None),
+        };
+        if kind != GeomType::Mesh {
             check_size(element, kind, size)?;
         }
-        Ok(ShapeSpec { kind, frame: outer.compose(&local), size, hfield, rgba: values.rgba, group: values.group })
+        let (rgba, group) = (values.rgba, values.group);
+        Ok(ShapeSpec { kind, frame: outer.compose(&frame), size, hfield, solid, rgba, group })
     }
 
     /// Whether the color is the default, in which case a material's color counts.
@@ -220,7 +247,7 @@ impl ShapeSpec {
         self.rgba == GRAY
     }
 
-    /// Volume; 0 for a plane.
+    /// Volume; 0 for a plane, the area for a shell.
     pub fn volume(&self) -> f64 {
         let [a, b, c] = self.size;
         match self.kind {
@@ -230,13 +257,14 @@ impl ShapeSpec {
             GeomType::Ellipsoid => 4.0 * PI * a * b * c / 3.0,
             // as in MuJoCo, a height field weighs as much as a box of its size
             GeomType::Box | GeomType::Hfield => 8.0 * a * b * c,
-            GeomType::Plane | GeomType::Mesh => 0.0,
+            GeomType::Mesh => self.solid.map_or(0.0, |solid| solid.volume),
+            GeomType::Plane => 0.0,
         }
     }
 
     /// Principal moments about the center of the solid shape, for a mass of 1.
     fn inertia_of_unit_mass(&self) -> Vec3 {
-        let [a, b, c] = self.size;
+        let [a, b, c] = self.solid.map_or(self.size, |solid| solid.inertia_box);
         match self.kind {
             GeomType::Sphere => [2.0 * a * a / 5.0; 3],
             GeomType::Capsule => {
@@ -255,29 +283,73 @@ impl ShapeSpec {
                 [across, across, a * a / 2.0]
             }
             GeomType::Ellipsoid => [b * b + c * c, a * a + c * c, a * a + b * b].map(|x| x / 5.0),
-            GeomType::Box | GeomType::Hfield => [b * b + c * c, a * a + c * c, a * a + b * b].map(|x| x / 3.0),
-            GeomType::Plane | GeomType::Mesh => [0.0; 3],
+            GeomType::Box | GeomType::Hfield | GeomType::Mesh => {
+                [b * b + c * c, a * a + c * c, a * a + b * b].map(|x| x / 3.0)
+            }
+            GeomType::Plane => [0.0; 3],
         }
     }
 }
 
 /// The height field that a geom shows; checks that its type and its asset agree.
-fn shown_asset(attrs: &Attrs, kind: GeomType, assets: &Assets) -> Result<Option<usize>, MjcfError> {
+fn shown_field(attrs: &Attrs, kind: GeomType, assets: &Assets) -> Result<Option<usize>, MjcfError> {
     let element = attrs.element;
     let given = |name: &str| attrs.find(name).filter(|(_, attr)| !attr.value.is_empty());
     match (kind, given("hfield")) {
-        (GeomType::Hfield, Some((owner, _))) => return assets.hfield_names.required(owner, "hfield").map(Some),
-        (GeomType::Hfield, None) => return Err(element.invalid("a height field needs the attribute 'hfield'")),
-        (_, Some(_)) => return Err(element.invalid("'hfield' needs type=\"hfield\"")),
-        (_, None) => {}
-    }
-    match (kind, given("mesh")) {
-        (GeomType::Mesh, Some((owner, _))) => assets.mesh_names.required(owner, "mesh").map(|_| None),
-        (GeomType::Mesh, None) => Err(element.invalid("a mesh needs the attribute 'mesh'")),
-        // a primitive fitted to a mesh
-        (_, Some((owner, _))) => Err(owner.unsupported(Some("mesh"), NO_MESH)),
+        (GeomType::Hfield, Some((owner, _))) => assets.hfield_names.required(owner, "hfield").map(Some),
+        (GeomType::Hfield, None) => Err(element.invalid("a height field needs the attribute 'hfield'")),
+        (_, Some(_)) => Err(element.invalid("'hfield' needs type=\"hfield\"")),
         (_, None) => Ok(None),
     }
+}
+
+/// The mesh that a geom shows or is fitted to.
+fn shown_mesh<'s>(
+    attrs: &Attrs,
+    kind: GeomType,
+    assets: &'s Assets,
+) -> Result<Option<(usize, &'s MeshAsset<'s>)>, MjcfError> {
+    match attrs.find("mesh").filter(|(_, attr)| !attr.value.is_empty()) {
+        Some((owner, _)) => {
+            let index = assets.mesh_names.required(owner, "mesh")?;
+            Ok(Some((index, &assets.meshes[index])))
+        }
+        None if kind == GeomType::Mesh => Err(attrs.element.invalid("a mesh needs the attribute 'mesh'")),
+        None => Ok(None),
+    }
+}
+
+/// The frame of a geom on a mesh, whose own frame is `local`. Sets the size, and returns the mesh unless a primitive replaces it.
+fn on_mesh(
+    attrs: &Attrs,
+    kind: GeomType,
+    index: usize,
+    asset: &MeshAsset,
+    settings: &Settings,
+    local: &Frame,
+    size: &mut Vec3,
+) -> Result<(Frame, Option<ShownMesh>), MjcfError> {
+    let solid = match &asset.content {
+        Content::Solid(solid) => solid,
+        // it is only seen, or the geom is refused
+        Content::Missing(_) if kind == GeomType::Mesh => {
+            *size = [0.0; 3];
+            return Ok((*local, None));
+        }
+        Content::Missing(error) => return Err(error.clone()),
+        Content::Unused => return Err(attrs.element.invalid(format!("the mesh '{}' was not read", asset.name))),
+    };
+    if kind == GeomType::Mesh {
+        *size = solid.size();
+        let shown = ShownMesh { mesh: index, volume: solid.volume, inertia_box: solid.inertia_box };
+        return Ok((local.compose(&solid.frame), Some(shown)));
+    }
+    let Some(center) = solid.fit(kind, settings.fitaabb, size) else {
+        let message = "a mesh can be fitted by a sphere, capsule, cylinder, ellipsoid or box, not by this type";
+        return Err(attrs.element.invalid(message));
+    };
+    *size = scale(*size, attrs.number_or("fitscale", 1.0)?);
+    Ok((local.compose(&Frame { pos: solid.frame.point(center), quat: solid.frame.quat }), None))
 }
 
 /// The frame between two end points, its z axis towards the first; sets the length in `size`.

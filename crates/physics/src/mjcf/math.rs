@@ -149,12 +149,22 @@ pub(crate) fn rotate_diagonal(quat: Quat, moments: Vec3) -> [f64; 6] {
 }
 
 /// Principal moments of a symmetric matrix `[xx, yy, zz, xy, xz, yz]`, largest first, and the frame of its axes.
-///
-/// Jacobi's method with the rotation kept as a quaternion.
 pub(crate) fn principal_axes(full: [f64; 6]) -> (Vec3, Quat) {
+    let size = full.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    principal_axes_within(full, f64::EPSILON * size, 1e-12)
+}
+
+/// The same for a mesh: MuJoCo leaves a ten millionth of the largest entry off the diagonal, and its meshes are turned accordingly.
+pub(crate) fn principal_axes_of_mesh(full: [f64; 6]) -> (Vec3, Quat) {
+    let size = full.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    principal_axes_within(full, 1e-7 * size, 1e-7 * size)
+}
+
+/// Jacobi's method with the rotation kept as a quaternion. It ends when all entries off the diagonal are at most `rest`. Moments
+/// that differ by less than `same` keep their order.
+fn principal_axes_within(full: [f64; 6], rest: f64, same: f64) -> (Vec3, Quat) {
     let [xx, yy, zz, xy, xz, yz] = full;
     let symmetric = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
-    let size = full.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     let mut quat = IDENTITY;
     let mut moments = [xx, yy, zz];
     // convergence is quadratic; a handful of turns reaches rounding error
@@ -171,7 +181,7 @@ pub(crate) fn principal_axes(full: [f64; 6]) -> (Vec3, Quat) {
         } else {
             0
         };
-        if !(off[turn].abs() > f64::EPSILON * size) {
+        if !(off[turn].abs() > rest) {
             break;
         }
         let (row, column) = [(1, 2), (0, 2), (0, 1)][turn];
@@ -187,9 +197,8 @@ pub(crate) fn principal_axes(full: [f64; 6]) -> (Vec3, Quat) {
         quat = normalized(mul_quat(quat, step));
     }
     // sort by quarter turns, which keep the frame right-handed; equal moments stay in place
-    const SAME: f64 = 1e-12;
     for lead in [0, 1, 0] {
-        if moments[lead] + SAME < moments[lead + 1] {
+        if moments[lead] + same < moments[lead + 1] {
             moments.swap(lead, lead + 1);
             let mut step = [std::f64::consts::FRAC_1_SQRT_2, 0.0, 0.0, 0.0];
             step[(lead + 2) % 3 + 1] = step[0];

@@ -8,7 +8,7 @@
 //!
 //! The way of a file: `document` parses the XML and expands includes, `schema` refuses what is misspelled or not
 //! supported, `defaults` lays classes under elements, `tree` reads the bodies, `inertia` gives them mass,
-//! `asset`, `tendon`, `equality`, `actuator`, `sensor` and `custom` read the rest, `assemble` puts the [`Model`] together,
+//! `asset` (with `mesh`), `tendon`, `equality`, `actuator`, `sensor` and `custom` read the rest, `assemble` puts the [`Model`] together,
 //! `mass_matrix` (with `factor`) and `statistics` compute what follows from the reference configuration. `room` counts the memory
 //! that all of them ask for. [`spec`] edits the document before it is compiled.
 //!
@@ -25,12 +25,14 @@ mod document;
 mod equality;
 mod error;
 mod factor;
+mod file;
 mod geom;
 mod inertia;
 mod joint;
 mod limit;
 mod mass_matrix;
 mod math;
+mod mesh;
 mod names;
 mod orientation;
 mod room;
@@ -46,7 +48,6 @@ mod value;
 
 pub use error::{MjcfError, MjcfErrorKind};
 
-use crate::budget::{self, MODEL_FILE};
 use crate::model::Model;
 use spec::ModelSpec;
 use std::path::Path;
@@ -73,7 +74,7 @@ impl Model {
         ModelSpec::from_xml_str(xml, name)?.compile()
     }
 
-    /// Compiles a model given as text. `resolve` returns the content of an included file or a height field, given its
+    /// Compiles a model given as text. `resolve` returns the content of an included file, a mesh or a height field, given its
     /// path relative to the model, or why there is none.
     ///
     /// # Errors
@@ -86,11 +87,6 @@ impl Model {
     ) -> Result<Model, MjcfError> {
         ModelSpec::from_xml_str_with(xml, name, resolve)?.compile_with(resolve)
     }
-}
-
-/// The bytes of a file within the budget.
-fn read(path: &Path) -> Result<Vec<u8>, String> {
-    budget::read(path, &MODEL_FILE).map_err(|e| e.to_string())
 }
 
 fn utf8(bytes: Vec<u8>) -> Result<String, String> {

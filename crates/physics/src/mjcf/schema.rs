@@ -69,8 +69,8 @@ const TOP: &[Rule] = &[
         rule(
             "compiler",
             "angle assetdir autolimits balanceinertia boundinertia boundmass coordinate eulerseq inertiafromgeom \
-             inertiagrouprange meshdir settotalmass strippath",
-            "conflict discardvisual fitaabb passthrough savecanonical savecompiled saveinertial texturedir usethread",
+             inertiagrouprange meshdir settotalmass strippath fitaabb",
+            "conflict discardvisual passthrough savecanonical savecompiled saveinertial texturedir usethread",
             "alignfree=false fusestatic=false",
         ),
         &[rule(
@@ -156,10 +156,17 @@ const VISUAL: &[Rule] = &[
     ),
 ];
 
-// assets that nothing refers to are of no consequence; geoms that refer to meshes are refused unless they neither
-// collide nor weigh
+// assets that nothing refers to are of no consequence
 const ASSET: &[Rule] = &[
-    anything("mesh"),
+    containing(
+        rule(
+            "mesh",
+            "name class file content_type vertex face scale refpos refquat maxhullvert inertia builtin params material",
+            "smoothnormal normal texcoord",
+            "",
+        ),
+        &[NO_PLUGIN],
+    ),
     rule("hfield", "name nrow ncol size elevation file content_type", "", ""),
     anything("skin"),
     anything("model"),
@@ -209,8 +216,8 @@ const BODY: &[Rule] = &[
             "geom",
             "name class type pos quat axisangle euler xyaxes zaxis fromto size mass density contype conaffinity \
              condim priority friction solmix solref solimp margin gap group rgba material \
-             hfield mesh fluidshape",
-            "castshadow fitscale fluidcoef user",
+             hfield mesh fitscale fluidshape",
+            "castshadow fluidcoef user",
             "adhesion=0 surfacevel=0 shellinertia=false",
         ),
         &[NO_PLUGIN],
@@ -385,7 +392,7 @@ const SENSOR: &[Rule] = &[
     sensor("e_kinetic", ""),
     sensor("clock", ""),
     sensor("user", "datatype dim needstage objtype objname"),
-    refused("tactile", "this sensor needs a mesh, and meshes are not supported"),
+    refused("tactile", "this sensor is not supported"),
     NO_PLUGIN,
 ];
 

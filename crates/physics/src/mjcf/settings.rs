@@ -33,6 +33,8 @@ pub(crate) struct Settings {
     pub medium: bool,
     /// Files are looked up by their last path component.
     pub strippath: bool,
+    /// Primitives are fitted to the bounding box of a mesh instead of its inertia.
+    pub fitaabb: bool,
 }
 
 impl Settings {
@@ -65,6 +67,7 @@ impl Settings {
             meshdir: String::new(),
             medium: false,
             strippath: false,
+            fitaabb: false,
         };
         for element in sections(root, "compiler") {
             settings.section(element)?;
@@ -97,6 +100,7 @@ impl Settings {
             }
         }
         self.strippath = attrs.flag_or("strippath", self.strippath)?;
+        self.fitaabb = attrs.flag_or("fitaabb", self.fitaabb)?;
         if let Some(attr) = element.attr("eulerseq") {
             let turn = |c: char| {
                 let axis = "xyz".find(c.to_ascii_lowercase())?;

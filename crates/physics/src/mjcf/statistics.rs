@@ -69,7 +69,7 @@ pub(crate) fn compute(model: &mut Model, pose: &Pose, diagonal: &[f64], given: &
     stat.center = given.center.unwrap_or(stat.center);
 }
 
-/// Radius of the sphere about a geom's center that contains it; 0 for a plane, and for a mesh, whose size is not known.
+/// Radius of the sphere about a geom's center that contains it; 0 for a plane, and for a mesh without its file.
 fn bounding_radius(model: &Model, geom: &Geom) -> f64 {
     let [a, b, c] = geom.size;
     match geom.kind {
@@ -77,12 +77,12 @@ fn bounding_radius(model: &Model, geom: &Geom) -> f64 {
         GeomType::Capsule => a + b,
         GeomType::Cylinder => (a * a + b * b).sqrt(),
         GeomType::Ellipsoid => a.max(b).max(c),
-        GeomType::Box => norm(geom.size),
+        GeomType::Box | GeomType::Mesh => norm(geom.size),
         GeomType::Hfield => geom.hfield.map_or(0.0, |h| {
             let [x, y, top, base] = model.hfields[h].size;
             norm([x, y, top.max(base)])
         }),
-        GeomType::Plane | GeomType::Mesh => 0.0,
+        GeomType::Plane => 0.0,
     }
 }
 

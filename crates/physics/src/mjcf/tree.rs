@@ -80,7 +80,7 @@ pub(crate) fn read<'a>(
     root: &'a Element,
     defaults: &'a Defaults<'a>,
     settings: &Settings,
-    assets: &Assets,
+    assets: &Assets<'a>,
 ) -> Result<Vec<BodySpec<'a>>, MjcfError> {
     let mut reader =
         Reader { defaults, settings, assets, bodies: vec![BodySpec::new(root, 0, Frame::IDENTITY, Frame::IDENTITY)] };
@@ -120,7 +120,7 @@ impl<'a> BodySpec<'a> {
 struct Reader<'a, 's> {
     defaults: &'a Defaults<'a>,
     settings: &'s Settings,
-    assets: &'s Assets<'s>,
+    assets: &'s Assets<'a>,
     bodies: Vec<BodySpec<'a>>,
 }
 

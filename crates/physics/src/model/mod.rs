@@ -8,14 +8,16 @@ use serde::{Deserialize, Serialize};
 
 mod actuator;
 mod coupling;
+mod hull;
 mod sensor;
 mod shape;
 mod view;
 
 pub use actuator::{Actuator, Dynamics, Transmission};
 pub use coupling::{Equality, EqualityKind, Tendon, TendonKind};
+pub use hull::Hull;
 pub use sensor::{Sensor, SensorObject, SensorType};
-pub use shape::{Geom, GeomType, HField, Pair, Site};
+pub use shape::{Geom, GeomType, HField, Mesh, Pair, Site};
 pub use view::{Camera, Light, TrackMode};
 
 /// A point or direction in meters (or unit free), `[x, y, z]`.
@@ -54,6 +56,10 @@ pub struct Model {
     pub lights: Vec<Light>,
     /// Height fields (`<asset><hfield>`).
     pub hfields: Vec<HField>,
+    /// Meshes of the geoms, to draw them.
+    pub meshes: Vec<Mesh>,
+    /// Convex hulls of the meshes that collide.
+    pub hulls: Vec<Hull>,
     /// Tendons.
     pub tendons: Vec<Tendon>,
     /// Equality constraints.

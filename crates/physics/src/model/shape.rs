@@ -20,8 +20,9 @@ pub enum GeomType {
     Cylinder,
     /// `size` half lengths.
     Box,
-    /// Triangle mesh. The loader only accepts meshes that neither collide nor have mass, and does not read their files.
-    /// The geom has no size. Its frame is the given one, not MuJoCo's principal axes.
+    /// Triangle mesh, [`Geom::mesh`]. It collides as its convex hull, [`Geom::hull`]. The geom's frame is that of the mesh's
+    /// principal axes, `size` the half lengths of a box around its origin that holds the mesh. A mesh that neither collides nor has
+    /// mass may lack its file: then the frame is the given one and `size` is zero.
     Mesh,
 }
 
@@ -42,6 +43,10 @@ pub struct Geom {
     pub size: Vec3,
     /// Index of the height field, for [`GeomType::Hfield`].
     pub hfield: Option<usize>,
+    /// Index of the convex hull, for a [`GeomType::Mesh`] that collides.
+    pub hull: Option<usize>,
+    /// Index of the mesh, for a [`GeomType::Mesh`] whose file was found.
+    pub mesh: Option<usize>,
     /// Bit mask: the collision type of this geom.
     pub contype: u32,
     /// Bit mask: the types that this geom collides with.
@@ -126,4 +131,15 @@ pub struct HField {
     pub size: [f64; 4],
     /// Elevations by rows, from 0 to 1.
     pub data: Vec<f32>,
+}
+
+/// A triangle mesh in the frame of the geoms that show it (MuJoCo `mesh_*`).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Mesh {
+    /// Name.
+    pub name: String,
+    /// Points in m.
+    pub vertices: Vec<[f32; 3]>,
+    /// Three points of each triangle, counterclockwise from outside.
+    pub faces: Vec<[u32; 3]>,
 }

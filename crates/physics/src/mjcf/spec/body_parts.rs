@@ -130,6 +130,11 @@ part! {
             Geom(Draft::new("geom").with("type", "hfield").with("hfield", field))
         }
 
+        /// A mesh of the model. It collides as its convex hull.
+        pub fn mesh(mesh: &str) -> Self {
+            Geom(Draft::new("geom").with("type", "mesh").with("mesh", mesh))
+        }
+
         /// Name.
         pub fn name(self, name: &str) -> Self {
             self.set("name", name)

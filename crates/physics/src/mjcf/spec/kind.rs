@@ -20,6 +20,8 @@ pub enum Kind {
     Light,
     /// A height field: an asset that geoms refer to.
     HField,
+    /// A mesh: an asset that geoms refer to.
+    Mesh,
     /// A tendon.
     Tendon,
     /// An equality constraint.
@@ -44,7 +46,7 @@ impl Kind {
     pub(super) fn section(self) -> &'static str {
         match self {
             Kind::Body | Kind::Joint | Kind::Geom | Kind::Site | Kind::Camera | Kind::Light => "worldbody",
-            Kind::HField => "asset",
+            Kind::HField | Kind::Mesh => "asset",
             Kind::Tendon => "tendon",
             Kind::Equality => "equality",
             Kind::ContactPair | Kind::ContactExclude => "contact",
@@ -64,6 +66,7 @@ impl Kind {
             Kind::Camera => "camera",
             Kind::Light => "light",
             Kind::HField => "height field",
+            Kind::Mesh => "mesh",
             Kind::Tendon => "tendon",
             Kind::Equality => "constraint",
             Kind::ContactPair => "contact pair",
@@ -84,6 +87,7 @@ impl Kind {
             Kind::Camera => tag == "camera",
             Kind::Light => tag == "light",
             Kind::HField => tag == "hfield",
+            Kind::Mesh => tag == "mesh",
             Kind::ContactPair => tag == "pair",
             Kind::ContactExclude => tag == "exclude",
             Kind::Keyframe => tag == "key",
@@ -94,14 +98,14 @@ impl Kind {
     /// The element's name, if it has one.
     pub(super) fn name(self, element: &Element) -> Option<&str> {
         match self {
-            Kind::HField => asset::given_name(element),
+            Kind::HField | Kind::Mesh => asset::given_name(element),
             _ => element.text("name").filter(|name| !name.is_empty()),
         }
     }
 
     /// The kind of an element in a section.
     pub(super) fn of(section: &str, tag: &str) -> Option<Kind> {
-        const ALL: [Kind; 14] = [
+        const ALL: [Kind; 15] = [
             Kind::Body,
             Kind::Joint,
             Kind::Geom,
@@ -109,6 +113,7 @@ impl Kind {
             Kind::Camera,
             Kind::Light,
             Kind::HField,
+            Kind::Mesh,
             Kind::Tendon,
             Kind::Equality,
             Kind::ContactPair,

@@ -45,12 +45,13 @@ mod write;
 pub use body_parts::{Body, Geom, Joint, Site};
 pub use element::{ElementMut, ElementRef};
 pub use kind::Kind;
-pub use model_parts::{Actuator, ContactExclude, Equality, HField, Keyframe, Sensor, Tendon};
+pub use model_parts::{Actuator, ContactExclude, Equality, HField, Keyframe, Mesh, Sensor, Tendon};
 pub use part::{BodyPart, ModelPart, Part};
 pub use value::AttrValue;
 
 use super::document::{self, Element, MAX_DEPTH, Place};
 use super::error::{MjcfError, MjcfErrorKind, shorten};
+use super::file::{self, ReadFile};
 use super::room::Room;
 use super::{assemble, schema};
 use crate::hint::nearest;
@@ -85,13 +86,14 @@ impl ModelSpec {
     pub fn from_xml_file(path: impl AsRef<FilePath>) -> Result<ModelSpec, MjcfError> {
         let path = path.as_ref();
         let shown = path.display().to_string();
-        let text = super::read(path).and_then(super::utf8).map_err(|reason| MjcfError {
+        let text = file::read(path).map_err(|e| e.reason).and_then(super::utf8).map_err(|reason| MjcfError {
             file: shown.clone(),
             line: 0,
             kind: MjcfErrorKind::Read(reason),
         })?;
         let folder = path.parent().map(FilePath::to_owned).unwrap_or_default();
-        let spec = Self::from_xml_str_with(&text, &shown, &|file| super::read(&folder.join(file)))?;
+        let spec =
+            Self::from_xml_str_with(&text, &shown, &|path| file::read(&folder.join(path)).map_err(|e| e.reason))?;
         Ok(ModelSpec { folder: Some(folder), ..spec })
     }
 
@@ -117,28 +119,32 @@ impl ModelSpec {
         Ok(ModelSpec { root, folder: None }.with_world())
     }
 
-    /// Compiles the model as it is now. Height field files are read from the folder of the model's file.
+    /// Compiles the model as it is now. Mesh and height field files are read from the folder of the model's file.
     ///
     /// # Errors
     /// If the model is not a valid, supported one, or asks for more than the [budget](crate::budget) allows.
     pub fn compile(&self) -> Result<Model, MjcfError> {
         match &self.folder {
-            Some(folder) => self.compile_with(&|file| super::read(&folder.join(file))),
+            Some(folder) => self.compile_from(&|path| file::read(&folder.join(path))),
             None => self.compile_with(&no_files),
         }
     }
 
-    /// The same. `resolve` returns the content of a height field file, given its path relative to the model.
+    /// The same. `resolve` returns the content of a mesh or height field file, given its path relative to the model.
     ///
     /// # Errors
     /// The same.
     pub fn compile_with(&self, resolve: &dyn Fn(&str) -> Result<Vec<u8>, String>) -> Result<Model, MjcfError> {
-        let room = Room::default();
-        room.take_document(&self.root)?;
-        assemble::compile(&self.root, resolve, &room)
+        self.compile_from(&|path| file::resolved(resolve(path)))
     }
 
-    /// The model as MJCF, with its includes and without comments. It names height field files as the model does, relative
+    fn compile_from(&self, read: &ReadFile) -> Result<Model, MjcfError> {
+        let room = Room::default();
+        room.take_document(&self.root)?;
+        assemble::compile(&self.root, read, &room)
+    }
+
+    /// The model as MJCF, with its includes and without comments. It names mesh and height field files as the model does, relative
     /// to the model's folder.
     pub fn to_xml(&self) -> String {
         write::text(&self.root)
@@ -218,7 +224,7 @@ impl ModelSpec {
         }
     }
 
-    /// Adds a part behind all others of its section: a height field, tendon, constraint, actuator, sensor or keyframe.
+    /// Adds a part behind all others of its section: a height field, mesh, tendon, constraint, actuator, sensor or keyframe.
     ///
     /// # Errors
     /// If its name is taken, or it has an attribute that MJCF does not have.

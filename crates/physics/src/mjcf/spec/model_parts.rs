@@ -1,4 +1,4 @@
-//! Parts of the model outside the tree of bodies: height fields, tendons, constraints, actuators, sensors, keyframes.
+//! Parts of the model outside the tree of bodies: height fields, meshes, tendons, constraints, actuators, sensors, keyframes.
 
 use super::kind::Kind;
 use super::part::{Draft, part};
@@ -17,6 +17,26 @@ part! {
         /// Elevations of all points, row by row from the largest y on. They are scaled to the range from 0 to 1.
         pub fn elevation(self, elevation: &[f64]) -> Self {
             self.set("elevation", elevation)
+        }
+    }
+}
+
+part! {
+    /// A mesh of triangles. [`Geom::mesh`](super::Geom::mesh) puts it into the world.
+    Mesh: Mesh in ModelPart {
+        /// The mesh of a file (STL, OBJ or MSH), named relative to the model's folder of meshes.
+        pub fn file(name: &str, file: &str) -> Self {
+            Mesh(Draft::new("mesh").with("name", name).with("file", file))
+        }
+
+        /// The convex hull of at least four points in m, three numbers each.
+        pub fn points(name: &str, points: &[f64]) -> Self {
+            Mesh(Draft::new("mesh").with("name", name).with("vertex", points))
+        }
+
+        /// Factors of its coordinates.
+        pub fn scale(self, scale: Vec3) -> Self {
+            self.set("scale", scale)
         }
     }
 }
