@@ -14,7 +14,7 @@ pub fn facts(model: &Model) -> Value {
     let geoms = model.geoms.iter().map(|geom| {
         json!({
             "name": geom.name, "kind": kind(geom.kind), "body": geom.body, "size": geom.size, "rgba": geom.rgba,
-            "field": geom.hfield, "group": geom.group,
+            "field": geom.hfield, "mesh": geom.mesh, "group": geom.group,
         })
     });
     let fields = model.hfields.iter().enumerate().map(|(i, field)| {
@@ -24,6 +24,7 @@ pub fn facts(model: &Model) -> Value {
             "pos": geom.map_or([0.0; 3], |geom| geom.pos),
         })
     });
+    let meshes = model.meshes.iter().map(|mesh| json!({ "vertices": mesh.vertices.len(), "faces": mesh.faces.len() }));
     json!({
         "nq": model.nq,
         "nv": model.nv,
@@ -31,6 +32,7 @@ pub fn facts(model: &Model) -> Value {
         "bodies": bodies.collect::<Vec<_>>(),
         "geoms": geoms.collect::<Vec<_>>(),
         "fields": fields.collect::<Vec<_>>(),
+        "meshes": meshes.collect::<Vec<_>>(),
         "timestep": model.opt.timestep,
     })
 }

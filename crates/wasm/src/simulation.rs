@@ -170,6 +170,20 @@ pub extern "C" fn simulation_ground(simulation: usize, field: usize) -> i32 {
     })
 }
 
+/// A mesh in the frame of its geoms: its points in single precision, m, then the numbers of three points of each triangle.
+#[unsafe(no_mangle)]
+pub extern "C" fn simulation_mesh(simulation: usize, mesh: usize) -> i32 {
+    ask::<Simulation>(simulation, |simulation, _| {
+        let meshes = &simulation.batch.model().meshes;
+        let Some(mesh) = meshes.get(mesh) else {
+            return Err(format!("there is no mesh {mesh}, the model has {}", meshes.len()).into());
+        };
+        let points = mesh.vertices.as_flattened().iter().flat_map(|x| x.to_le_bytes());
+        let triangles = mesh.faces.as_flattened().iter().flat_map(|i| i.to_le_bytes());
+        Ok(Answer::bytes(points.chain(triangles).collect()))
+    })
+}
+
 /// Hash of the state, as text.
 #[unsafe(no_mangle)]
 pub extern "C" fn simulation_hash(simulation: usize) -> i32 {

@@ -84,12 +84,12 @@ class Models implements View {
   }
 
   #facts({ model }: Simulation): HTMLElement {
-    const boxes = model.geoms.filter(({ kind, group }) => kind === "mesh" && group < 3).length;
+    const boxes = model.geoms.filter(({ kind, mesh, group }) => kind === "mesh" && mesh === null && group < 3).length;
     return el(
       "div",
       {},
       el("p", {}, `${model.bodies.length - 1} bodies, ${model.nv} degrees of freedom, ${model.actuators.length} actuators, ${(1000 * model.timestep).toFixed(1)} ms a step`),
-      boxes > 0 && el("p", { class: "notice" }, "Meshes are shown as boxes."),
+      boxes > 0 && el("p", { class: "notice" }, "Meshes without files are not shown."),
     );
   }
 

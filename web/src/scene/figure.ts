@@ -1,5 +1,6 @@
 /** Figures made of the geoms of a model: one instanced mesh per geom, with an instance for each agent. */
 import {
+  type BufferGeometry,
   Color,
   Group,
   InstancedMesh,
@@ -9,10 +10,10 @@ import {
   SRGBColorSpace,
   SphereGeometry,
 } from "three";
-import type { ModelInfo } from "marathon-rl";
+import type { MeshData, ModelInfo } from "marathon-rl";
 import { METAL, type Stuff, TINTS, stuffOf, visibleGeoms } from "./colors";
 import type { Level } from "./quality";
-import { shapeOf } from "./shapes";
+import { meshOf, shapeOf } from "./shapes";
 
 interface Part {
   readonly mesh: InstancedMesh;
@@ -28,6 +29,8 @@ export interface FigureOptions {
   readonly joints?: boolean;
   /** A color for each agent. */
   readonly tinted?: boolean;
+  /** The triangles of a mesh of the model. */
+  readonly mesh?: (index: number) => MeshData;
   readonly level: Level;
 }
 
@@ -36,15 +39,19 @@ export class Figure {
   readonly #parts: Part[] = [];
   readonly #balls: Part[] = [];
   readonly #agents: number;
+  /** Meshes of the model's own, which no other figure has. */
+  readonly #own: BufferGeometry[] = [];
   /** Shift of each agent, m: x, y. */
   readonly #shifts: Float32Array;
 
-  constructor(model: ModelInfo, { agents, joints, tinted, level }: FigureOptions) {
+  constructor(model: ModelInfo, { agents, joints, tinted, mesh: data, level }: FigureOptions) {
     this.#agents = agents;
     this.#shifts = new Float32Array(2 * agents);
     for (const index of visibleGeoms(model)) {
       const geom = model.geoms[index];
-      const shape = geom && shapeOf(geom.kind, geom.size);
+      const own = geom && geom.mesh !== null && data ? meshOf(data(geom.mesh)) : null;
+      if (own) this.#own.push(own);
+      const shape = own ?? (geom && shapeOf(geom.kind, geom.size));
       if (!geom || !shape) continue;
       const stuff = stuffOf(model, geom);
       const mesh = new InstancedMesh(shape, materialOf(stuff, false, level, tinted === true), agents);
@@ -80,6 +87,7 @@ export class Figure {
       (mesh.material as Material).dispose();
       mesh.dispose();
     }
+    for (const shape of this.#own) shape.dispose();
     this.group.removeFromParent();
   }
 

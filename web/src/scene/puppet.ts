@@ -1,6 +1,6 @@
 /** One figure that the page simulates: its shapes or skin, the hand that pulls it, the balls that hit it. */
 import { BufferGeometry, Line, LineBasicMaterial, type Ray, Vector3 } from "three";
-import type { ModelInfo, Vector } from "marathon-rl";
+import type { MeshData, ModelInfo, Vector } from "marathon-rl";
 import type { Hands } from "../input/pointer";
 import { Forces } from "../physics/forces";
 import { Spring } from "../physics/spring";
@@ -19,6 +19,8 @@ export interface Body {
   poses(): Float32Array;
   bodyPoses(): Float32Array;
   push(body: number, force: Vector, torque: Vector): void;
+  /** The triangles of a mesh. */
+  mesh?(index: number): MeshData;
 }
 
 /** Change of speed that a push gives the whole figure, m/s, and how long it lasts, s. */
@@ -58,7 +60,12 @@ export class Puppet implements Hands {
     this.dt = dt;
     const { model } = body;
     this.mass = model.bodies.reduce((sum, { mass }) => sum + mass, 0);
-    this.#figure = new Figure(model, { agents: 1, joints, level: stage.level });
+    this.#figure = new Figure(model, {
+      agents: 1,
+      joints,
+      level: stage.level,
+      ...(body.mesh ? { mesh: (index: number) => body.mesh!(index) } : {}),
+    });
     this.#rods = rodsOf(model);
     this.#forces = new Forces(model, (...push) => body.push(...push));
     this.#geoms = new PoseTrack(16 * model.geoms.length);

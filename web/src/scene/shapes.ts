@@ -1,6 +1,6 @@
 /** Meshes of geoms. What lies along an axis of a model lies along z, as in MJCF. */
-import { BoxGeometry, type BufferGeometry, CapsuleGeometry, CylinderGeometry, SphereGeometry } from "three";
-import type { Geom, GeomKind } from "marathon-rl";
+import { BoxGeometry, BufferAttribute, BufferGeometry, CapsuleGeometry, CylinderGeometry, SphereGeometry } from "three";
+import type { Geom, GeomKind, MeshData } from "marathon-rl";
 
 const cache = new Map<string, BufferGeometry>();
 
@@ -13,6 +13,16 @@ export function shapeOf(kind: GeomKind, size: Geom["size"]): BufferGeometry | nu
     if (shape !== null) cache.set(key, shape);
   }
   return shape;
+}
+
+/** The mesh of triangles, with flat faces. */
+export function meshOf({ vertices, faces }: MeshData): BufferGeometry {
+  const shared = new BufferGeometry();
+  shared.setAttribute("position", new BufferAttribute(vertices, 3));
+  shared.setIndex(new BufferAttribute(faces, 1));
+  const flat = shared.toNonIndexed();
+  flat.computeVertexNormals();
+  return flat;
 }
 
 function make(kind: GeomKind, [x, y, z]: Geom["size"]): BufferGeometry | null {
@@ -28,7 +38,7 @@ function make(kind: GeomKind, [x, y, z]: Geom["size"]): BufferGeometry | null {
     case "box":
       return new BoxGeometry(2 * x, 2 * y, 2 * z);
     case "mesh":
-      // its triangles stay in the module: the box around it stands for it
+      // without its file, the box around it stands for it
       return x > 0 && y > 0 && z > 0 ? new BoxGeometry(2 * x, 2 * y, 2 * z) : null;
     case "plane":
     case "hfield":

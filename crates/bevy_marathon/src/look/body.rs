@@ -108,7 +108,11 @@ fn dress(
         let main = main_color(model);
         for (number, geom) in visible(model) {
             let (mesh, material) = match geom.kind {
-                GeomType::Plane | GeomType::Mesh => continue,
+                GeomType::Plane => continue,
+                GeomType::Mesh => {
+                    let Some(mesh) = geom.mesh.and_then(|i| model.meshes.get(i)) else { continue };
+                    (meshes.add(triangles(mesh)), wardrobe.material(&mut materials, stuff(model, geom, main, tint)))
+                }
                 GeomType::Hfield => {
                     let Some(surface) = surface(model, geom, track, own) else { continue };
                     (meshes.add(surface), wardrobe.soil(&mut materials, &mut images, adapter.as_deref()))
@@ -299,6 +303,16 @@ fn shape(kind: GeomType, [x, y, z]: [f32; 3]) -> Mesh {
             .scaled_by(Vec3::new(x, z, y)),
         _ => Sphere::new(x).mesh().uv(28, 16).rotated_by(Quat::from_rotation_x(-std::f32::consts::FRAC_PI_2)),
     }
+}
+
+/// A mesh of the model in the game's axes, with flat faces.
+fn triangles(mesh: &marathon_physics::model::Mesh) -> Mesh {
+    let positions: Vec<Vec3> = mesh.vertices.iter().map(|p| to_game(p.map(f64::from))).collect();
+    Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
+        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions)
+        .with_inserted_indices(Indices::U32(mesh.faces.as_flattened().to_vec()))
+        .with_duplicated_vertices()
+        .with_computed_flat_normals()
 }
 
 /// The surface of a height field at a place, with elevations of an agent's own or the model's; its checker continues that of the ground around it.

@@ -33,6 +33,7 @@ export interface Exports {
   simulation_state(simulation: number): number;
   simulation_set_state(simulation: number): number;
   simulation_ground(simulation: number, field: number): number;
+  simulation_mesh(simulation: number, mesh: number): number;
   simulation_hash(simulation: number): number;
   training_new(): number;
   training_iterate(training: number): number;

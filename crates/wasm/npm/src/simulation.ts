@@ -1,7 +1,7 @@
 import { type Bridge, Handle, joinState, splitState } from "./bridge.js";
 import type { Vector } from "./env.js";
 import { ARRAY, MATRIX } from "./exports.js";
-import type { ModelInfo, State } from "./types.js";
+import type { MeshData, ModelInfo, State } from "./types.js";
 
 /** A model by itself, without a task. */
 export class Simulation extends Handle {
@@ -64,6 +64,14 @@ export class Simulation extends Handle {
   ground(field: number): Float32Array {
     this.bridge.call((exports) => exports.simulation_ground(this.object, field));
     return new Float32Array(this.bridge.bytes().buffer);
+  }
+
+  /** A mesh, to draw it. */
+  mesh(index: number): MeshData {
+    this.bridge.call((exports) => exports.simulation_mesh(this.object, index));
+    const { buffer } = this.bridge.bytes();
+    const points = 3 * (this.model.meshes[index]?.vertices ?? 0);
+    return { vertices: new Float32Array(buffer, 0, points), faces: new Uint32Array(buffer, 4 * points) };
   }
 
   /** 16 hexadecimal digits over the bits of the state. They are the same in all browsers and in the native program. */

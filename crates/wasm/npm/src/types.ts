@@ -20,6 +20,8 @@ export interface Geom {
   readonly rgba: readonly [number, number, number, number];
   /** Index of its height field, for `hfield`. */
   readonly field: number | null;
+  /** Index of its mesh, for `mesh` whose file was given. */
+  readonly mesh: number | null;
   /** Group for viewers; by custom, viewers hide 3 and above. */
   readonly group: number;
 }
@@ -43,6 +45,14 @@ export interface Field {
   readonly pos: readonly [number, number, number];
 }
 
+/** A triangle mesh in the frame of its geoms. */
+export interface MeshData {
+  /** Points, m, `[vertex][3]`. */
+  readonly vertices: Float32Array;
+  /** Three points of each triangle, counterclockwise from outside. */
+  readonly faces: Uint32Array;
+}
+
 /** The parts of a model. */
 export interface ModelInfo {
   readonly nq: number;
@@ -52,6 +62,8 @@ export interface ModelInfo {
   readonly bodies: readonly Body[];
   readonly geoms: readonly Geom[];
   readonly fields: readonly Field[];
+  /** Numbers of points and triangles of each mesh. */
+  readonly meshes: readonly { readonly vertices: number; readonly faces: number }[];
   /** Seconds of a physics step. */
   readonly timestep: number;
 }

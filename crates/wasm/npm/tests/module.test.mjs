@@ -104,6 +104,24 @@ test("height fields have heights in meters", () => {
   assert.throws(() => simulation.ground(1), /no height field 1/);
 });
 
+test("meshes have their triangles", () => {
+  const xml = `<mujoco><asset><mesh name="tip" file="tip.obj"/></asset>
+    <worldbody><body><freejoint/><geom type="mesh" mesh="tip"/></body></worldbody></mujoco>`;
+  const obj = "v 0 0 0\nv 3 0 0\nv 0 2 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+  const simulation = marathon.simulation(xml, { "tip.obj": new TextEncoder().encode(obj) });
+  const { geoms, meshes } = simulation.model;
+  assert.deepEqual([geoms[0].mesh, meshes[0]], [0, { vertices: 4, faces: 4 }]);
+  const { vertices, faces } = simulation.mesh(0);
+  assert.deepEqual([vertices.length, faces.length, Math.max(...faces)], [12, 12, 3]);
+  const volume = [0, 1, 2, 3].reduce((sum, face) => {
+    const [a, b, c] = [0, 1, 2].map((i) => vertices.subarray(3 * faces[3 * face + i], 3 * faces[3 * face + i] + 3));
+    const cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
+    return sum + (a[0] * cross[0] + a[1] * cross[1] + a[2] * cross[2]) / 6;
+  }, 0);
+  assert.ok(Math.abs(volume - 1) < 1e-5, `${volume}`);
+  assert.deepEqual(marathon.simulation(xml.replace("<geom", '<geom contype="0" conaffinity="0" mass="0"').replace("<freejoint/>", "<freejoint/><geom size=\"1\"/>")).model.meshes, []);
+});
+
 test("a module for play has the same bits, but no training", async () => {
   const play = await load({ lanes: process.env.MARATHON_LANES ?? "exact", parts: "play" });
   const hashes = [marathon, play].map((module) => {
