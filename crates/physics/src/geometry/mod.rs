@@ -11,6 +11,7 @@
 
 pub(crate) mod box_box;
 pub(crate) mod capsule_box;
+pub(crate) mod convex;
 pub(crate) mod field_capsule;
 pub(crate) mod height;
 pub(crate) mod plane;
