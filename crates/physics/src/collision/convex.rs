@@ -2,10 +2,9 @@
 
 use super::candidate::{Candidate, add_all, gather};
 use super::slots::Slots;
-use crate::algebra::spatial::*;
 use crate::geometry::convex::{Form, Number, Polyhedron, Solid, convex, field_convex, plane_hull};
 use crate::geometry::{Plane, first_tangent, pick, pick_axes};
-use crate::lanes::{Real, kernel_fn};
+use crate::lanes::kernel_fn;
 use crate::model::GeomType;
 use crate::sim::{PairSpec, ShapePair, Sim};
 use crate::state::{Group, Work};

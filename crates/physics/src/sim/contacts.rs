@@ -130,7 +130,7 @@ pub(super) fn contacts<T: Real>(
                 let (ka, kb) = (model.geoms[a].kind, model.geoms[b].kind);
                 return refuse(
                     format!("contact of the {ka:?} {} with the {kb:?} {}", label(model, a), label(model, b)),
-                    "use spheres, capsules or boxes, or turn the contact off with contype and conaffinity",
+                    "fix planes and height fields to the world, or turn the contact off with contype and conaffinity",
                 );
             }
             let spec = out.specs.len() as u32 - 1;

@@ -6,12 +6,7 @@ use super::vector::*;
 
 /// Clips a polygon, or an edge as a polygon of two corners, against the sides of a convex face. The face is clockwise
 /// about its normal (Sutherland and Hodgman, "Reentrant polygon clipping", 1974). The result replaces `polygon`.
-pub(super) fn clip<S: Number>(
-    face: &[V3<S>],
-    normal: &V3<S>,
-    polygon: &mut Vec<V3<S>>,
-    clipped: &mut Vec<V3<S>>,
-) {
+pub(super) fn clip<S: Number>(face: &[V3<S>], normal: &V3<S>, polygon: &mut Vec<V3<S>>, clipped: &mut Vec<V3<S>>) {
     let zero = S::zero();
     let slack = S::lit(if is_single::<S>() { 1e-7 } else { TINY });
     for (i, corner) in face.iter().enumerate() {

@@ -163,28 +163,30 @@ impl<S: Number> Solid<'_, S> {
 }
 
 /// Corners of the faces of a box: upper and lower along each axis. Bit `k` is the side along axis `k`.
-const BOX_FACES: [[i32; 4]; 6] =
-    [[7, 3, 1, 5], [2, 6, 4, 0], [2, 3, 7, 6], [4, 5, 1, 0], [6, 7, 5, 4], [3, 2, 0, 1]];
+const BOX_FACES: [[i32; 4]; 6] = [[7, 3, 1, 5], [2, 6, 4, 0], [2, 3, 7, 6], [4, 5, 1, 0], [6, 7, 5, 4], [3, 2, 0, 1]];
 
-/// Cosine and sine of a quarter of a right angle.
-const SHORT: (f64, f64) = (0.923_879_532_511_286_7, 0.382_683_432_365_089_8);
-const HALF: f64 = std::f64::consts::FRAC_1_SQRT_2;
+/// Cosine and sine of a quarter of a right angle, and of half of one, to 15 digits. The last digits are MuJoCo's: they
+/// decide between quadrilaterals of equal area.
+const LONG: f64 = 0.923_879_532_511_287;
+const SHORT: f64 = 0.382_683_432_365_090;
+const HALF: f64 = 0.707_106_781_186_548;
+const LESS: f64 = 0.707_106_781_186_547;
 /// Corners of a cap of radius 1, counterclockwise.
 const CAP_CORNERS: [(f64, f64); CAP] = [
     (1.0, 0.0),
-    SHORT,
+    (LONG, SHORT),
     (HALF, HALF),
-    (SHORT.1, SHORT.0),
+    (SHORT, LONG),
     (0.0, 1.0),
-    (-SHORT.1, SHORT.0),
-    (-HALF, HALF),
-    (-SHORT.0, SHORT.1),
+    (-SHORT, LONG),
+    (-LESS, HALF),
+    (-LONG, SHORT),
     (-1.0, 0.0),
-    (-SHORT.0, -SHORT.1),
+    (-LONG, -SHORT),
     (-HALF, -HALF),
-    (-SHORT.1, -SHORT.0),
+    (-SHORT, -LONG),
     (0.0, -1.0),
-    (SHORT.1, -SHORT.0),
-    (HALF, -HALF),
-    (SHORT.0, -SHORT.1),
+    (SHORT, -LONG),
+    (LESS, -HALF),
+    (LONG, -SHORT),
 ];

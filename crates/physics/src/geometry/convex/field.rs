@@ -6,9 +6,9 @@ use super::super::height::HeightField;
 use super::super::{CAPACITY, Rot, V3};
 use super::gjk::Search;
 use super::manifold::Contact;
+use super::pair::{Pair, Scratch};
 use super::support::{Form, Solid};
 use super::vector::*;
-use super::{Scratch, collide};
 
 /// Finds the contacts of a height field and a convex shape.
 pub(super) fn field_convex<S: Number>(
@@ -30,10 +30,9 @@ pub(super) fn field_convex<S: Number>(
     let [columns, rows] = [(0, field.cols), (1, field.rows)].map(|(k, lines)| {
         let line = |x: S| S::widen((x + field.half[k]) * field.per_cell[k]);
         let last = (lines - 1) as f64;
+        let (first, end) = (line(low[k]).floor(), line(high[k]).ceil());
         // NaN finds no cell
-        let first = line(low[k]).floor().max(0.0);
-        let end = line(high[k]).ceil().min(last);
-        if first < end { first as usize..end as usize } else { 0..0 }
+        if first < last && end > 0.0 { first.max(0.0) as usize..end.min(last) as usize } else { 0..0 }
     });
     let mut found = 0;
     for row in rows {
@@ -51,7 +50,8 @@ pub(super) fn field_convex<S: Number>(
                     report(Contact { dist: contact.dist, pos, normal: turn(axes, &contact.normal) });
                     found += 1;
                 };
-                collide([&prism, &local], margin, false, search, scratch, &mut take);
+                let pair = Pair { solids: [&prism, &local], margin, several: false, search };
+                pair.contacts(scratch, &mut take);
                 if found == CAPACITY {
                     return;
                 }

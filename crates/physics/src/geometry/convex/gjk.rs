@@ -44,7 +44,12 @@ impl<S: Number> Couple<'_, S> {
     pub(super) fn support(&mut self, direction: &V3<S>) -> Vertex<S> {
         let [a, b] = &mut self.shapes;
         let (p, q) = (a.support(direction), b.support(&neg(direction)));
-        Vertex { point: sub(&p.point, &q.point), on: [p.point, q.point], core: [p.core, q.core], index: [p.index, q.index] }
+        Vertex {
+            point: sub(&p.point, &q.point),
+            on: [p.point, q.point],
+            core: [p.core, q.core],
+            index: [p.index, q.index],
+        }
     }
 
     /// Whether both shapes have finitely many support points. Then a search ends exactly.
@@ -77,48 +82,42 @@ pub(super) fn nearest<S: Number>(couple: &mut Couple<S>, search: &Search<S>, cut
     let enough = if discrete { zero } else { S::lit(0.5) * search.tolerance * search.tolerance };
     let witness = [couple.shapes[0].solid.inside(), couple.shapes[1].solid.inside()];
     let mut x = sub(&witness[0], &witness[1]);
-    let vertex = Vertex { point: x, on: witness, core: witness, index: [-1; 2] };
+    // replaced before it is used, unless there are no iterations
+    let vertex = Vertex { point: x, on: witness, core: witness, index: [0; 2] };
     let mut simplex = [vertex; 4];
     let mut weights = [S::lit(1.0), zero, zero, zero];
     let mut count = 0;
-    for iteration in 0..search.iterations {
+    for _ in 0..search.iterations {
         let square = dot(&x, &x);
-        if square < least * least {
+        let start = count == 0;
+        if square < least * least && !start {
             break;
         }
         let length = square.sqrt();
-        let new = couple.support(&scale(&x, -S::lit(1.0).div(length)));
-        let lower = dot(&x, &new.point);
-        let mut enough = enough;
-        if is_single::<S>() {
-            enough = larger(enough, S::lit(2.0 * S::EPSILON) * length * (length + norm(&new.point)));
-        }
-        if dot(&x, &sub(&x, &new.point)) < enough {
-            break;
-        }
-        let apart = match cutoff {
-            None => zero < lower,
-            Some(cutoff) => zero < lower && !(lower < cutoff * length),
-        };
-        if apart {
-            return None;
+        // coinciding centers have no direction
+        let towards = if length < least { [-S::lit(1.0), zero, zero] } else { scale(&x, -S::lit(1.0).div(length)) };
+        let new = couple.support(&towards);
+        if !(length < least) {
+            let lower = dot(&x, &new.point);
+            let rounding = S::lit(if is_single::<S>() { 2.0 * S::EPSILON } else { 0.0 });
+            let enough = larger(enough, rounding * length * (length + norm(&new.point)));
+            if dot(&x, &sub(&x, &new.point)) < enough {
+                break;
+            }
+            let far = cutoff.is_none_or(|cutoff| !(lower < cutoff * length));
+            if zero < lower && far {
+                return None;
+            }
         }
         simplex[count] = new;
         weights = closest(&simplex, count + 1);
-        count = 0;
-        for i in 0..4 {
-            if weights[i] != zero {
-                simplex[count] = simplex[i];
-                weights[count] = weights[i];
-                count += 1;
-            }
-        }
+        count = keep_weighted(&mut simplex, &mut weights);
         let before = x;
         x = mix(&simplex, &weights, count, |v| &v.point);
         if count == 4 {
             break;
         }
-        if iteration > 0 && has_stalled(&x, &before, square) {
+        if !start && has_stalled(&x, &before, square) {
             break;
         }
     }
@@ -127,14 +126,32 @@ pub(super) fn nearest<S: Number>(couple: &mut Couple<S>, search: &Search<S>, cut
     if count > 0 {
         found.witness = [0, 1].map(|side| mix(&simplex, &weights, count, |v| &v.on[side]));
     }
-    // within the tolerance the side of the support plane decides
-    if cutoff.is_none() && zero < distance && !(search.tolerance < distance) {
-        let last = couple.support(&scale(&x, -S::lit(1.0).div(distance)));
-        if zero < dot(&x, &last.point) {
-            return None;
+    if cutoff.is_none() && is_separated(couple, search, &mut found, &x) { None } else { Some(found) }
+}
+
+/// Near the surface, and where rounding has stopped the search, the side of the support plane decides whether two shapes
+/// overlap. `x` is the closest point.
+fn is_separated<S: Number>(couple: &mut Couple<S>, search: &Search<S>, found: &mut Nearest<S>, x: &V3<S>) -> bool {
+    let unsure = !(search.tolerance < found.distance) || is_single::<S>();
+    if !unsure || !(S::zero() < found.distance) {
+        return false;
+    }
+    let last = couple.support(&scale(x, -S::lit(1.0).div(found.distance)));
+    found.distance = S::zero();
+    S::zero() < dot(x, &last.point)
+}
+
+/// Moves the vertices of a simplex that have a weight to the front, and returns their number.
+fn keep_weighted<S: Number>(simplex: &mut [Vertex<S>; 4], weights: &mut [S; 4]) -> usize {
+    let mut count = 0;
+    for i in 0..4 {
+        if weights[i] != S::zero() {
+            simplex[count] = simplex[i];
+            weights[count] = weights[i];
+            count += 1;
         }
     }
-    Some(found)
+    count
 }
 
 /// Whether the closest point has stopped to move. `square` is the square of its distance before.

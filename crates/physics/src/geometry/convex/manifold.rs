@@ -5,7 +5,7 @@ use super::clip::{clip, quadrilateral};
 use super::feature::{EDGE_TOLERANCE, Edge, FACE_TOLERANCE, Face, Feature};
 use super::gjk::Vertex;
 use super::support::{Form, Solid};
-use super::*;
+use super::vector::*;
 
 /// A contact of two shapes.
 #[derive(Clone, Copy, Debug)]

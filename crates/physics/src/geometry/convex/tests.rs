@@ -10,6 +10,7 @@
 #[path = "../../../tests/common/mod.rs"]
 mod common;
 
+use super::vector::*;
 use super::*;
 use crate::geometry::Sphere;
 use crate::geometry::height::HeightField;
@@ -48,7 +49,8 @@ fn compiled_hull(mesh: &Value) -> Option<Hull> {
 
 /// The form of a geom of the oracle's job. `None` for planes and height fields.
 fn form<'a, S: Number>(geom: &Value, hull: Option<&'a Polyhedron<S>>) -> Option<Form<'a, S>> {
-    let size: Vec<S> = geom["size"].as_array().map_or(Vec::new(), |_| numbers(&geom["size"]).into_iter().map(S::lit).collect());
+    let size: Vec<S> =
+        geom["size"].as_array().map_or(Vec::new(), |_| numbers(&geom["size"]).into_iter().map(S::lit).collect());
     Some(match geom["type"].as_str().expect("a type") {
         "sphere" => Form::Sphere { radius: size[0] },
         "capsule" => Form::Capsule { radius: size[0], half: size[1] },
@@ -189,7 +191,9 @@ fn check(pairs: &[([Value; 2], Bounds)], percent: usize) {
     let margins = [0.0, 0.02];
     let jobs: Vec<(Value, Bounds)> = pairs
         .iter()
-        .flat_map(|(geoms, bounds)| margins.map(|m| (json!({"geoms": geoms, "margin": m, "states": STATES, "seed": 7}), *bounds)))
+        .flat_map(|(geoms, bounds)| {
+            margins.map(|m| (json!({"geoms": geoms, "margin": m, "states": STATES, "seed": 7}), *bounds))
+        })
         .collect();
     let answers = common::oracle("convex_contacts.py", &json!(jobs.iter().map(|j| &j.0).collect::<Vec<_>>()));
     let mut failures = Vec::new();
@@ -400,7 +404,8 @@ fn a_hull_of_a_box_touches_like_the_box() {
         let (center, axes) = ([0.11 + 0.02 * noise(i, 5), 0.02, 0.3], rotation(i));
         let solid = |form| Solid { center, axes, form };
         let other = Solid { center: [0.0; 3], axes: UPRIGHT, form: Form::Cuboid { half: [0.15; 3] } };
-        let [x, y] = [Form::Hull(&hull), Form::Cuboid { half: [0.1, 0.2, 0.3] }].map(|f| list(&other, &solid(f), 0.0, false));
+        let [x, y] =
+            [Form::Hull(&hull), Form::Cuboid { half: [0.1, 0.2, 0.3] }].map(|f| list(&other, &solid(f), 0.0, false));
         assert_eq!(x.len(), y.len());
         for (x, y) in x.iter().zip(&y) {
             assert!((x.dist - y.dist).abs() < 1e-9, "pose {i}: {} and {}", x.dist, y.dist);
@@ -437,6 +442,28 @@ fn shapes_without_numbers_do_not_touch() {
         let touches = list(a, b, 0.01, true);
         assert!(touches.iter().all(|t| t.dist.is_nan() || t.dist.abs() < 1.0), "{touches:?}");
     }
-    // coinciding centers have no direction, but a finite depth
-    assert!(list(&same, &same, 0.0, true).iter().all(|t| t.dist.is_finite() && t.normal.iter().all(|x| x.is_finite())));
+}
+
+#[test]
+fn shapes_with_coinciding_centers_touch() {
+    let forms = [
+        Form::Cuboid { half: [0.1, 0.15, 0.2] },
+        Form::Cylinder { radius: 0.1, half: 0.15 },
+        Form::Ellipsoid { half: [0.1, 0.15, 0.2] },
+    ];
+    for first in forms {
+        for second in forms {
+            let a = Solid { center: [0.0; 3], axes: UPRIGHT, form: first };
+            let b = Solid { center: [0.0, 0.0, 1e-9], axes: UPRIGHT, form: second };
+            let touches = list(&a, &b, 0.0, true);
+            assert!(!touches.is_empty(), "{first:?} and {second:?}");
+            for t in touches {
+                // the directions have no meaning, and deep smooth shapes end at the cap of iterations
+                assert!(
+                    (t.dist + 0.2).abs() < 5e-3 && (norm(&t.normal) - 1.0).abs() < 1e-12,
+                    "{first:?} {second:?}: {t:?}"
+                );
+            }
+        }
+    }
 }
