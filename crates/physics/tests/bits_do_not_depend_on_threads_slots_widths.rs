@@ -3,7 +3,7 @@
 //! An agent's trajectory depends only on its own state and controls. The bits stay the same for any other agents in its
 //! vector register, any number of agents, any slot, and any number of threads and lanes. The agents of this test start
 //! differently, so a group always holds standing, falling and lying ones. They run long enough to reach every branch of
-//! the solver. All features are on: contacts between moving bodies, elliptic cones, terrain, equality constraints,
+//! the solver. All features are on: contacts between moving bodies, elliptic cones, terrain, convex shapes, equality constraints,
 //! tendons, activations, pushes, and each agent's own constants and ground.
 
 mod common;
@@ -74,6 +74,7 @@ fn models() -> Vec<Model> {
         "full/actuators_implicitfast",
         "full/actuators_rk4",
         "full/medium",
+        "convex",
     ]
     .map(|n| dir.join(format!("crates/physics/tests/models/{n}.xml")));
     let capped = ["capped/quadruped", "capped/four_legs", "full/pile", "full/elliptic"]

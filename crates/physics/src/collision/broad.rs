@@ -46,7 +46,8 @@ fn surround<T: Real>(sim: &Sim<T>, work: &Work<T>, broad: &Broad<T::Scalar>, geo
             }
         }
         GeomType::Ellipsoid => half = [size[0].max(size[1]).max(size[2]); 3],
-        GeomType::Plane | GeomType::Hfield | GeomType::Mesh => half = [T::lit(f64::INFINITY); 3],
+        GeomType::Mesh => half = [model.hull.map_or(T::lit(f64::INFINITY), |h| T::splat(sim.hulls[h].radius)); 3],
+        GeomType::Plane | GeomType::Hfield => half = [T::lit(f64::INFINITY); 3],
     }
     let mut center = work.contacts.centers[geom];
     if let Some(l) = mount.link {

@@ -4,6 +4,8 @@
 //! geoms.
 
 mod broad;
+mod candidate;
+mod convex;
 mod floor;
 mod narrow_phase;
 mod slots;

@@ -4,22 +4,16 @@
 //! thousands of pairs, the broad phase ([`broad`]) first selects those that may be near.
 
 use super::broad;
-use super::slots::{Place, Slots, write_contact};
+use super::candidate::{Candidate, add_all, gather};
+use super::convex::touch_convex;
+use super::slots::{Place, Slots};
 use crate::algebra::spatial::*;
 use crate::geometry::height::{Terrain, field_box};
-use crate::geometry::{self, Capsule, Cuboid, Cylinder, Plane, Sphere, Touch, Touches, pick, pick_axes};
+use crate::geometry::{self, Capsule, Cuboid, Cylinder, Plane, Sphere, Touch, pick, pick_axes};
 use crate::geometry::{box_box, capsule_box, field_capsule, plane, round};
 use crate::lanes::{MAX_LANES, Real};
 use crate::sim::{Cull, GeomPairOf, Mount, ShapePair, Sim};
 use crate::state::{Group, Work, clearance};
-
-/// A pair that is near in some lanes.
-struct Candidate<T: Real> {
-    place: Place,
-    /// Centers of the geoms, relative to the place's reference point.
-    centers: [V3<T>; 2],
-    near: T::Mask,
-}
 
 /// Finds the contacts of all pairs and writes their blocks.
 #[inline(always)]
@@ -170,6 +164,10 @@ fn touch_pair<T: Real>(
             touch_field(sim, group, work, slots, candidate);
             return None;
         }
+        ShapePair::PlaneHull | ShapePair::Convex | ShapePair::FieldConvex => {
+            touch_convex(sim, group, work, slots, candidate);
+            return None;
+        }
         ShapePair::CapsuleBox | ShapePair::BoxBox | ShapePair::FieldBox => {
             one_by_one(sim, group, work, slots, candidate);
             return None;
@@ -192,23 +190,6 @@ fn cylinder<T: Real>(work: &Work<T>, m: &Mount<T::Scalar>, center: V3<T>, size: 
 #[inline(always)]
 fn cuboid<T: Real>(work: &Work<T>, m: &Mount<T::Scalar>, center: V3<T>, half: V3<T>) -> Cuboid<T> {
     Cuboid { center, axes: work.motion.axes(m), half }
-}
-
-/// Writes the contacts that a pair has in some lanes.
-#[inline(always)]
-fn add_all<T: Real>(
-    sim: &Sim<T>,
-    group: &Group<T>,
-    work: &mut Work<T>,
-    slots: &mut Slots<T>,
-    place: Place,
-    found: &[Touch<T>],
-) {
-    for touch in found {
-        if T::any(touch.on) {
-            write_contact(sim, group, work, slots, place, touch);
-        }
-    }
 }
 
 /// Narrow phase of a height field and a capsule or sphere.
@@ -273,22 +254,4 @@ fn one_by_one<T: Real>(
     add_all(sim, group, work, slots, candidate.place, &found);
     work.contacts.touches = found;
     work.contacts.lane_touches = own;
-}
-
-/// Copies one lane's contacts into that lane of `found`.
-#[inline(always)]
-fn gather<T: Real>(touches: &Touches<T::Scalar>, lane: usize, found: &mut Vec<Touch<T>>) {
-    for (k, t) in touches.as_slice().iter().enumerate() {
-        if k == found.len() {
-            found.push(Touch::none());
-        }
-        let touch = &mut found[k];
-        touch.on = T::or(touch.on, T::from_bits(1 << lane));
-        touch.dist.set(lane, t.dist);
-        for i in 0..3 {
-            touch.pos[i].set(lane, t.pos[i]);
-            touch.normal[i].set(lane, t.normal[i]);
-            touch.tangent[i].set(lane, t.tangent[i]);
-        }
-    }
 }

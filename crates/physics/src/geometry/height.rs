@@ -17,10 +17,10 @@ pub(crate) struct HeightField<S: Real> {
     pub rows: usize,
     pub cols: usize,
     /// Half the extent along x and y.
-    half: [S; 2],
+    pub(super) half: [S; 2],
     /// Size of a cell, and its inverse.
-    cell: [S; 2],
-    per_cell: [S; 2],
+    pub(super) cell: [S; 2],
+    pub(super) per_cell: [S; 2],
     /// Depth of the base below the origin.
     pub base: S,
     /// Heights, row by row.

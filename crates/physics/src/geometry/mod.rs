@@ -1,16 +1,18 @@
 //! Narrow phase: contacts of two shapes.
 //!
 //! Every function takes two shapes in the order of MuJoCo's shape types (plane, height field, sphere, capsule,
-//! ellipsoid, cylinder, box). It finds MuJoCo's contacts between them: the same features, number and frames. Positions
-//! are relative to a point near the shapes that the caller chooses, which keeps single precision accurate far from the
-//! world's origin. Pairs without a function here need iteration.
+//! ellipsoid, cylinder, box, mesh). It finds MuJoCo's contacts between them: the same features, number and frames.
+//! Positions are relative to a point near the shapes that the caller chooses, which keeps single precision accurate far
+//! from the world's origin.
 //!
 //! Pairs with a fixed number of candidate contacts ([`round`], [`plane`], and spheres on boxes) use all lanes at once.
 //! The others ([`capsule_box`], [`box_box`], [`height`]) choose among many features. They process one agent at a time,
-//! with branches, and fill a [`Touches`]. [`field_capsule`] combines both methods.
+//! with branches, and fill a [`Touches`]. [`field_capsule`] combines both methods. [`convex`] finds the contacts of all
+//! other pairs by iteration.
 
 pub(crate) mod box_box;
 pub(crate) mod capsule_box;
+pub(crate) mod convex;
 pub(crate) mod field_capsule;
 pub(crate) mod height;
 pub(crate) mod plane;

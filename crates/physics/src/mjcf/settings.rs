@@ -141,6 +141,8 @@ pub(crate) fn options(root: &Element) -> Result<Options, MjcfError> {
         ls_iterations: 50,
         tolerance: 1e-8,
         ls_tolerance: 0.01,
+        ccd_iterations: 35,
+        ccd_tolerance: 1e-6,
         solver: Solver::Newton,
         contact_override: None,
         flags: Flags {
@@ -158,6 +160,7 @@ pub(crate) fn options(root: &Element) -> Result<Options, MjcfError> {
             refsafe: true,
             eulerdamp: true,
             filterparent: true,
+            multiccd: true,
             island: true,
         },
     };
@@ -200,7 +203,13 @@ fn option(element: &Element, opt: &mut Options, given: &mut ContactOverride) -> 
     }
     opt.tolerance = at_least_zero("tolerance", attrs.number_or("tolerance", opt.tolerance)?)?;
     opt.ls_tolerance = at_least_zero("ls_tolerance", attrs.number_or("ls_tolerance", opt.ls_tolerance)?)?;
-    for (name, value) in [("iterations", &mut opt.iterations), ("ls_iterations", &mut opt.ls_iterations)] {
+    opt.ccd_tolerance = at_least_zero("ccd_tolerance", attrs.number_or("ccd_tolerance", opt.ccd_tolerance)?)?;
+    let counts = [
+        ("iterations", &mut opt.iterations),
+        ("ls_iterations", &mut opt.ls_iterations),
+        ("ccd_iterations", &mut opt.ccd_iterations),
+    ];
+    for (name, value) in counts {
         if let Some(attr) = element.attr(name) {
             let given = attrs.integer_or(name, 0)?;
             *value = usize::try_from(given).map_err(|_| element.bad_value(attr, "an integer that is not negative"))?;
@@ -249,6 +258,7 @@ fn flags(element: &Element, flags: &mut Flags) -> Result<Option<bool>, MjcfError
             "refsafe" => Some(&mut flags.refsafe),
             "eulerdamp" => Some(&mut flags.eulerdamp),
             "filterparent" => Some(&mut flags.filterparent),
+            "multiccd" => Some(&mut flags.multiccd),
             "island" => Some(&mut flags.island),
             _ => None,
         };

@@ -113,6 +113,10 @@ pub struct Options {
     pub tolerance: f64,
     /// Tolerance of the line search, as a fraction of the solver's.
     pub ls_tolerance: f64,
+    /// Cap on the iterations that find the contacts of convex shapes.
+    pub ccd_iterations: usize,
+    /// Error of the depths of those contacts, m.
+    pub ccd_tolerance: f64,
     /// Solver set in the file.
     pub solver: Solver,
     /// Parameters that replace those of every contact (`<flag override="enable"/>`), if any.
@@ -178,6 +182,8 @@ pub struct Flags {
     pub eulerdamp: bool,
     /// Whether parents and children do not collide with each other.
     pub filterparent: bool,
+    /// Whether pairs of convex shapes with flat faces have several contacts.
+    pub multiccd: bool,
     /// Whether trees that no constraint connects are solved separately.
     pub island: bool,
 }

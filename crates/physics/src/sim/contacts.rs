@@ -130,7 +130,7 @@ pub(super) fn contacts<T: Real>(
                 let (ka, kb) = (model.geoms[a].kind, model.geoms[b].kind);
                 return refuse(
                     format!("contact of the {ka:?} {} with the {kb:?} {}", label(model, a), label(model, b)),
-                    "use spheres, capsules or boxes, or turn the contact off with contype and conaffinity",
+                    "fix planes and height fields to the world, or turn the contact off with contype and conaffinity",
                 );
             }
             let spec = out.specs.len() as u32 - 1;
@@ -171,7 +171,8 @@ fn kinds(model: &Model, mounts: &[BodyMount], link: impl Fn(usize) -> Option<usi
     let mut kind = |(index, g): (usize, &Geom)| {
         let body = &model.bodies[g.body];
         let alone = if link(index).is_some() { 0 } else { index as u64 + 1 };
-        let mut key = vec![alone, g.kind as u64, g.condim as u64, g.priority as u64];
+        let hull = g.hull.map_or(0, |h| h as u64 + 1);
+        let mut key = vec![alone, hull, g.kind as u64, g.condim as u64, g.priority as u64];
         let single = [g.margin, g.solmix, body.mass];
         let shape = [&g.size[..], &g.pos, &g.quat, &g.friction, &g.solref, &g.solimp, &single];
         let [w, v] = body.invweight0;

@@ -37,6 +37,7 @@ pub(crate) use pairs::{Cull, GeomPair, GeomPairOf, PairSpec, ShapePair};
 pub(crate) use softness::{Cost, Softness, impedance, impedance_at};
 pub(crate) use tendon::TendonSpec;
 
+use crate::geometry::convex::{MOST_ITERATIONS, Polyhedron, Search};
 use crate::geometry::height::HeightField;
 use crate::lanes::Real;
 use crate::model::{Cone, Integrator, Model};
@@ -72,6 +73,9 @@ pub struct Sim<T: Real> {
     pub(crate) wind: [T::Scalar; 3],
     pub(crate) contacts: Contacts<T::Scalar>,
     pub(crate) fields: Vec<HeightField<T::Scalar>>,
+    pub(crate) hulls: Vec<Polyhedron<T::Scalar>>,
+    /// Settings of the search for contacts of convex shapes.
+    pub(crate) search: Search<T::Scalar>,
     /// Frames, centers of mass (inertial frames), geoms and sites relative to the links they move with.
     pub(crate) bodies: Vec<Mount<T::Scalar>>,
     pub(crate) coms: Vec<Mount<T::Scalar>>,
@@ -141,6 +145,12 @@ impl<T: Real> Sim<T> {
             wind: model.opt.wind.map(c),
             contacts,
             fields: model.hfields.iter().map(HeightField::new).collect(),
+            hulls: model.hulls.iter().map(Polyhedron::new).collect(),
+            search: Search {
+                tolerance: c(model.opt.ccd_tolerance),
+                iterations: model.opt.ccd_iterations.min(MOST_ITERATIONS),
+                several: flags.multiccd,
+            },
             bodies: (0..model.bodies.len()).map(|b| mount(b, &[0.0; 3], &[1.0, 0.0, 0.0, 0.0])).collect(),
             coms: model.bodies.iter().enumerate().map(|(b, x)| mount(b, &x.ipos, &x.iquat)).collect(),
             geoms: model.geoms.iter().map(|g| mount(g.body, &g.pos, &g.quat)).collect(),

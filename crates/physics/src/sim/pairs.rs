@@ -5,6 +5,7 @@ use super::softness::{Cost, Softness, softness};
 use super::weights::{inverse_weights, is_hard};
 use super::weld::BodyMount;
 use crate::geometry::bounding_radius;
+use crate::geometry::convex::hull_radius;
 use crate::lanes::Real;
 use crate::model::{Cone, Geom, GeomType, Model};
 
@@ -25,6 +26,10 @@ pub(crate) enum ShapePair {
     BoxBox,
     FieldCapsule,
     FieldBox,
+    /// The pairs below need iteration, or a hull.
+    PlaneHull,
+    Convex,
+    FieldConvex,
 }
 
 impl ShapePair {
@@ -45,7 +50,10 @@ impl ShapePair {
             (G::Box, G::Box) => ShapePair::BoxBox,
             (G::Hfield, G::Sphere | G::Capsule) => ShapePair::FieldCapsule,
             (G::Hfield, G::Box) => ShapePair::FieldBox,
-            _ => return None,
+            (G::Hfield, G::Ellipsoid | G::Cylinder | G::Mesh) => ShapePair::FieldConvex,
+            (G::Plane, G::Mesh) => ShapePair::PlaneHull,
+            (G::Plane | G::Hfield, G::Plane | G::Hfield) | (_, G::Plane | G::Hfield) => return None,
+            _ => ShapePair::Convex,
         })
     }
 }
@@ -94,6 +102,9 @@ pub(crate) struct PairSpec<C> {
     /// In MJCF's order. Unused sizes are zero: a sphere is a capsule without length.
     pub sizes: [[C; 3]; 2],
     pub shapes: ShapePair,
+    pub kinds: [GeomType; 2],
+    /// Hulls of the geoms, for meshes.
+    pub hulls: [usize; 2],
     /// Height field of the first geom.
     pub field: usize,
     pub cull: Cull,
@@ -151,6 +162,10 @@ pub(super) fn add<T: Real>(
     let c = T::scalar;
     let [a, b] = geoms.map(|g| &model.geoms[g]);
     let Some(shapes) = ShapePair::of(a.kind, b.kind) else { return false };
+    // a mesh without a hull does not collide
+    if [a, b].iter().any(|g| g.kind == GeomType::Mesh && g.hull.is_none()) {
+        return false;
+    }
     // moving planes and fields are not supported
     if matches!(a.kind, GeomType::Plane | GeomType::Hfield) && links[0].is_some() {
         return false;
@@ -175,13 +190,18 @@ pub(super) fn add<T: Real>(
         GeomType::Hfield => Cull::Field,
         _ => Cull::Balls,
     };
-    let radius = |g: &Geom| bounding_radius(g.kind, &g.size);
+    let radius = |g: &Geom| match g.hull {
+        Some(hull) => hull_radius(&model.hulls[hull]),
+        None => bounding_radius(g.kind, &g.size),
+    };
     let sizes = |g: &Geom| if g.kind == GeomType::Sphere { [g.size[0], 0.0, 0.0] } else { g.size };
     *hard |= is_hard(model, mounts, [a.body, b.body], diag);
     specs.push(PairSpec {
         coupled: links[0].is_some() && links[1].is_some(),
         sizes: [sizes(a).map(c), sizes(b).map(c)],
         shapes,
+        kinds: [a.kind, b.kind],
+        hulls: [a, b].map(|g| g.hull.unwrap_or(0)),
         field: a.hfield.unwrap_or(0),
         cull,
         reach: c(if cull == Cull::Balls { radius(a) } else { 0.0 } + radius(b) + params.margin),

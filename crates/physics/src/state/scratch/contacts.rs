@@ -2,7 +2,7 @@
 
 use crate::algebra::spatial::V3;
 use crate::geometry::field_capsule::Gaps;
-use crate::geometry::{Touch, Touches};
+use crate::geometry::{Touch, Touches, convex};
 use crate::lanes::Real;
 use crate::sim::Sim;
 use crate::state::clearance::Clearances;
@@ -29,6 +29,8 @@ pub(crate) struct GeomContacts<T: Real> {
     /// Contacts of one pair of geoms, and of one lane of them.
     pub touches: Vec<Touch<T>>,
     pub lane_touches: Touches<T::Scalar>,
+    /// Memory of the searches between convex shapes.
+    pub convex: convex::Scratch<T::Scalar>,
     /// Gaps between one pair of a height field and another geom.
     pub gaps: Gaps<T>,
 }
@@ -51,6 +53,7 @@ impl<T: Real> GeomContacts<T> {
             sweep: Sweep::new(if sim.contacts.broad.is_some() { sim.geoms.len() } else { 0 }),
             touches: Vec::new(),
             lane_touches: Touches::new(),
+            convex: convex::Scratch::new(),
             gaps: Gaps::new(),
         }
     }

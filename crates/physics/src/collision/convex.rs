@@ -1,0 +1,73 @@
+//! Narrow phase of convex shapes that need iteration, and of hulls: one lane at a time.
+
+use super::candidate::{Candidate, add_all, gather};
+use super::slots::Slots;
+use crate::geometry::convex::{Form, Number, Polyhedron, Solid, convex, field_convex, plane_hull};
+use crate::geometry::{Plane, first_tangent, pick, pick_axes};
+use crate::lanes::kernel_fn;
+use crate::model::GeomType;
+use crate::sim::{PairSpec, ShapePair, Sim};
+use crate::state::{Group, Work};
+
+kernel_fn! {
+    /// Finds and writes the contacts of a pair of convex shapes, or of one with a plane or height field.
+    pub(super) fn touch_convex<'a, T>(
+        sim: &'a Sim<T>,
+        group: &'a Group<T>,
+        work: &'a mut Work<T>,
+        slots: &'a mut Slots<T>,
+        candidate: &'a Candidate<T>,
+    ) {
+        let pair = &sim.contacts.pair(&sim.geoms, candidate.place.index);
+        let [m, n] = [&sim.geoms[pair.geoms[0]], &sim.geoms[pair.geoms[1]]];
+        let axes = [work.motion.axes(m), work.motion.axes(n)];
+        let mut found = std::mem::take(&mut work.contacts.touches);
+        let contacts = &mut work.contacts;
+        let (scratch, own) = (&mut contacts.convex, &mut contacts.lane_touches);
+        found.clear();
+        let bits = T::bits(candidate.near);
+        for lane in 0..T::LANES {
+            if bits >> lane & 1 == 0 {
+                continue;
+            }
+            let [a, b] = [pick(&candidate.centers[0], lane), pick(&candidate.centers[1], lane)];
+            let [turned_a, turned_b] = [pick_axes(&axes[0], lane), pick_axes(&axes[1], lane)];
+            let second = Solid { center: b, axes: turned_b, form: form(pair, 1, &sim.hulls) };
+            own.clear();
+            match pair.shapes {
+                ShapePair::PlaneHull => {
+                    let plane = Plane { point: a, normal: turned_a[2] };
+                    plane_hull(&plane, &second, pair.margin, scratch, own);
+                }
+                ShapePair::FieldConvex => {
+                    let field = group.ground(sim, lane, pair.field);
+                    field_convex((field, &a, &turned_a), &second, pair.margin, &sim.search, scratch, own);
+                }
+                _ => {
+                    let first = Solid { center: a, axes: turned_a, form: form(pair, 0, &sim.hulls) };
+                    convex(&first, &second, pair.margin, &sim.search, scratch, own);
+                }
+            }
+            gather(own, lane, &mut found);
+        }
+        for touch in &mut found {
+            touch.tangent = first_tangent(&touch.normal);
+        }
+        add_all(sim, group, work, slots, candidate.place, &found);
+        work.contacts.touches = found;
+    }
+}
+
+/// The shape of one of a pair's geoms.
+fn form<'a, S: Number>(pair: &PairSpec<S>, which: usize, hulls: &'a [Polyhedron<S>]) -> Form<'a, S> {
+    let [x, y, z] = pair.sizes[which];
+    match pair.kinds[which] {
+        GeomType::Capsule => Form::Capsule { radius: x, half: y },
+        GeomType::Ellipsoid => Form::Ellipsoid { half: [x, y, z] },
+        GeomType::Cylinder => Form::Cylinder { radius: x, half: y },
+        GeomType::Box => Form::Cuboid { half: [x, y, z] },
+        GeomType::Mesh => Form::Hull(&hulls[pair.hulls[which]]),
+        // planes and height fields have no form of their own
+        GeomType::Sphere | GeomType::Plane | GeomType::Hfield => Form::Sphere { radius: x },
+    }
+}
