@@ -7,14 +7,12 @@
 //!
 //! Without MuJoCo: every depth is that of the contact's normal, and no other direction has a much smaller one.
 
-#[path = "../../../tests/common/mod.rs"]
-mod common;
-
 use super::vector::*;
 use super::*;
 use crate::geometry::Sphere;
 use crate::geometry::height::HeightField;
 use crate::geometry::round::sphere_cylinder;
+use crate::geometry::tests::common;
 use crate::model::{HField, Hull};
 use serde_json::{Value, json};
 
