@@ -4,8 +4,8 @@ Reads a JSON list of jobs from standard input, one per pair of geoms:
     {"geoms": [GEOM, GEOM], "margin": m, "multiccd": bool, "states": n, "seed": s}
     GEOM: as in contacts.py, or {"type": "mesh", "vertices": [[x, y, z], ...]}
 and prints a JSON list with, per job, {"meshes": MESHES, "states": [STATE, ...]}. A mesh's frame is not that of the file:
-MESHES has, per geom, null or its compiled {"vertices": [...], "polygons": [[index, ...], ...], "normals": [...]}, where
-the vertices outside its hull are left out. STATE: {"geoms": [[position, rotation row by row], ...],
+MESHES has, per geom, null or its compiled {"vertices": [...], "polygons": [[index, ...], ...], "normals": [...]}. All
+vertices of a mesh should be corners of its hull. STATE: {"geoms": [[position, rotation row by row], ...],
 "contacts": [[dist, pos, normal], ...], "ambiguous": bool}, geoms and contacts in MuJoCo's order.
 
 A state is ambiguous if displacements of 1e-9 change the number of contacts, or move a distance or a position by more than

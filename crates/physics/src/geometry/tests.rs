@@ -9,7 +9,7 @@
 //! lie on axes, faces, edges and corners; axes are parallel or perpendicular; numbers have no rounding errors.
 
 #[path = "../../tests/common/mod.rs"]
-mod common;
+pub(super) mod common;
 
 use super::box_box::box_box;
 use super::capsule_box::capsule_box;

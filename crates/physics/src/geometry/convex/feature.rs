@@ -169,7 +169,9 @@ const BOX_FACES: [[i32; 4]; 6] = [[7, 3, 1, 5], [2, 6, 4, 0], [2, 3, 7, 6], [4, 
 /// decide between quadrilaterals of equal area.
 const LONG: f64 = 0.923_879_532_511_287;
 const SHORT: f64 = 0.382_683_432_365_090;
+#[expect(clippy::approx_constant, reason = "MuJoCo's digits")]
 const HALF: f64 = 0.707_106_781_186_548;
+#[expect(clippy::approx_constant, reason = "MuJoCo's digits")]
 const LESS: f64 = 0.707_106_781_186_547;
 /// Corners of a cap of radius 1, counterclockwise.
 const CAP_CORNERS: [(f64, f64); CAP] = [

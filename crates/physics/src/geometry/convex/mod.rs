@@ -1,9 +1,9 @@
 //! Contacts of convex shapes: spheres, capsules, ellipsoids, cylinders, boxes, hulls of meshes.
 //!
-//! MuJoCo's rules decide which contacts there are, and [`pair`] has their order. [`gjk`] finds the distance of two shapes that are apart, [`epa`] the
-//! depth of two that overlap. Spheres and capsules are first shrunk to points and segments, and all shapes lose their
-//! margin; if they are apart then, the distance is exact. If several contacts are allowed, [`manifold`] clips the faces
-//! or edges at the closest points against each other.
+//! MuJoCo's rules decide which contacts there are; [`pair`] has their order. [`gjk`] finds the distance of two shapes
+//! that are apart, [`epa`] the depth of two that overlap. Spheres and capsules are first shrunk to points and segments,
+//! and all shapes lose their margin; if they are apart then, the distance is exact. If several contacts are allowed,
+//! [`manifold`] clips the faces or edges at the closest points against each other.
 //!
 //! One agent is processed at a time. The results depend on the two shapes only, not on earlier steps.
 

@@ -1,8 +1,8 @@
 //! The point of a segment, triangle or tetrahedron that is closest to the origin, as weights of the corners.
 //!
-//! The weights are ratios of signed lengths, areas and volumes (Montanari, Petrinic and Barbieri, "Improving the GJK
-//! algorithm for faster and more reliable distance queries between convex objects", 2017). All of them are computed from
-//! edges at the last corner, so that corners far from the origin do not cancel.
+//! The weights are ratios of signed lengths, areas and volumes. All of them are computed from edges at the last corner, so
+//! that corners far from the origin do not cancel. Source: Montanari, Petrinic and Barbieri, "Improving the GJK algorithm
+//! for faster and more reliable distance queries between convex objects", 2017.
 
 use super::super::V3;
 use super::vector::*;

@@ -1,20 +1,18 @@
 //! Contract: the contacts of convex shapes are MuJoCo's, with its default settings.
 //!
-//! On hundreds of random poses per pair of shapes, with and without a margin, the number of contacts, their distances,
+//! Each pair of shapes has hundreds of random poses, with and without a margin. The number of contacts, their distances,
 //! positions and normals agree with those of the `mujoco` package. Poses in which displacements of 1e-9 change MuJoCo's
 //! own answer are left out. Smooth shapes agree within MuJoCo's tolerance of 1e-6, shapes with corners to the last digits.
 //! Single precision agrees with double precision within its rounding.
 //!
 //! Without MuJoCo: every depth is that of the contact's normal, and no other direction has a much smaller one.
 
-#[path = "../../../tests/common/mod.rs"]
-mod common;
-
 use super::vector::*;
 use super::*;
 use crate::geometry::Sphere;
 use crate::geometry::height::HeightField;
 use crate::geometry::round::sphere_cylinder;
+use crate::geometry::tests::common;
 use crate::model::{HField, Hull};
 use serde_json::{Value, json};
 
