@@ -60,7 +60,7 @@ impl Model {
     /// # Errors
     ///
     /// The file or an included one cannot be read, is not a valid, supported model, or asks for more than the
-    /// [budget] allows.
+    /// [budget](crate::budget) allows.
     pub fn from_xml_file(path: impl AsRef<Path>) -> Result<Model, MjcfError> {
         ModelSpec::from_xml_file(path)?.compile()
     }
