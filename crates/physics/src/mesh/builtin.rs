@@ -22,7 +22,7 @@ pub(crate) enum Builtin {
 /// Makes a mesh. Lengths are 1; `scale` of the mesh changes that.
 ///
 /// # Errors
-/// What the parameters are, and what was expected.
+/// An error about the parameters: those found and those expected.
 pub(crate) fn make(shape: Builtin, params: &[f64]) -> Result<Triangles, String> {
     let expected = |what: &str| format!("'params' is {params:?}, expected {what}");
     match (shape, params) {

@@ -42,7 +42,7 @@ pub(crate) struct MeshAsset<'a> {
     pub content: Content,
 }
 
-/// What is known of a mesh.
+/// Facts of a mesh.
 pub(crate) enum Content {
     /// No geom refers to it, so it was not read.
     Unused,

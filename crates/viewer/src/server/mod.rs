@@ -33,7 +33,7 @@ pub struct Viewer {
     thread: Option<JoinHandle<()>>,
 }
 
-/// What the threads of connections share.
+/// Data of all connections.
 struct Shared {
     page: PathBuf,
     token: String,

@@ -5,7 +5,7 @@ import { relaxedFuses } from "./probe.js";
 /** Kind of vectors of a module: multiply-adds of relaxed SIMD, or exact emulation. The bits are the same. */
 export type Lanes = "relaxed" | "exact";
 
-/** What a module can do: everything, or all but training and the import of recordings in two thirds of the size. */
+/** Parts of a module: everything, or all but training and the import of recordings, in two thirds of the size. */
 export type Parts = "all" | "play";
 
 /** Options of `load`. */
