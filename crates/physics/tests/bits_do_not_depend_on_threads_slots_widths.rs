@@ -74,7 +74,7 @@ fn models() -> Vec<Model> {
         "full/actuators_implicitfast",
         "full/actuators_rk4",
         "full/medium",
-        "convex",
+        "convex/heap",
     ]
     .map(|n| dir.join(format!("crates/physics/tests/models/{n}.xml")));
     let capped = ["capped/quadruped", "capped/four_legs", "full/pile", "full/elliptic"]
