@@ -17,7 +17,7 @@ mod common;
 
 use common::numbers::{distance, largest};
 use marathon_physics::mjcf::{MjcfError, MjcfErrorKind};
-use marathon_physics::model::Solver;
+use marathon_physics::model::{GeomType, Solver};
 use marathon_physics::{Group, Model, Readings, Sim, SimError, SimOptions, Work};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -30,6 +30,10 @@ use std::path::{Path, PathBuf};
 const STATES: usize = 20;
 /// Largest relative error.
 const BOUND: f64 = 1e-8;
+/// The same of models whose contacts MuJoCo finds by iteration, to its tolerance of 1e-6.
+const ITERATED_BOUND: f64 = 1e-6;
+/// Models that differ by more, and why. At most 2 % of those that load are here.
+const DIFFERING: [(&str, &str); 0] = [];
 /// Models that MuJoCo loads and that move: the subject of the contract.
 const AT_LEAST: usize = 100;
 
@@ -251,6 +255,7 @@ struct Row {
 }
 
 const AGREES: &str = "agree with MuJoCo";
+const DIFFERS: &str = "differ";
 const STILL: &str = "load, nothing to compare";
 const REFUSED: &str = "refused by name";
 const BROKEN: &str = "MuJoCo refuses them too";
@@ -261,7 +266,9 @@ fn bucket(error: f64) -> &'static str {
         e if e <= 1e-12 => "1e-12",
         e if e <= 1e-10 => "1e-10",
         e if e <= 1e-9 => "1e-9",
-        _ => "1e-8",
+        e if e <= BOUND => "1e-8",
+        e if e <= ITERATED_BOUND => "1e-6",
+        _ => "more",
     }
 }
 
@@ -272,9 +279,9 @@ fn table(rows: &[Row], same: usize, empty: usize) -> String {
     for row in rows {
         packages.entry(&row.package).or_default().push(row);
     }
-    let verdicts = [AGREES, STILL, REFUSED, BROKEN];
+    let verdicts = [AGREES, DIFFERS, STILL, REFUSED, BROKEN];
     writeln!(text, "| package | files | {} |", verdicts.join(" | ")).expect("text");
-    writeln!(text, "|---|---|---|---|---|---|").expect("text");
+    writeln!(text, "|---|---|---|---|---|---|---|").expect("text");
     let everything: Vec<&Row> = rows.iter().collect();
     for (name, rows) in packages.iter().map(|(n, r)| (*n, r)).chain([("**all**", &everything)]) {
         let counts: Vec<String> = verdicts.iter().map(|v| tally(v, rows).to_string()).collect();
@@ -310,6 +317,9 @@ controls. A model *agrees* if these quantities equal MuJoCo's in double precisio
 * acceleration, constraint forces, number of contacts, sensors and the next state;
 * after the same number of iterations, where the file's cap ends MuJoCo's iteration early;
 * within the file's tolerance where the iteration converges, and to 1e-8 when both solve to the end.
+
+Models with ellipsoids, cylinders or meshes that collide agree to 1e-6: MuJoCo finds their contacts by an iteration that stops at this
+tolerance. The few that differ by more are marked, with the cause.
 
 The column *error* bounds the largest relative error of all these. States in which MuJoCo has no definite answer are drawn again: those
 with accelerations above 1e8, and those in which a change of position by 1e-9 changes the contacts or the acceleration by more than 1e-4.
@@ -389,7 +399,13 @@ fn foreign_models_agree_or_are_refused() {
                 if answer.states.is_empty() {
                     (STILL, "loads; rounding decides what it touches".into())
                 } else if let Ok(agreement) = catch_unwind(AssertUnwindSafe(|| compare(loaded, &answer.states))) {
-                    failures.extend(disagreement(&file.id, m, &agreement));
+                    let cause = DIFFERING.iter().find(|(id, _)| *id == file.id).map(|(_, cause)| *cause);
+                    let problem = disagreement(&file.id, m, &agreement);
+                    match (&problem, cause) {
+                        (Some(problem), None) => failures.push(problem.clone()),
+                        (None, Some(_)) => failures.push(format!("{}: agrees, but is listed as differing", file.id)),
+                        _ => {}
+                    }
                     let cap = (m.opt.iterations, m.opt.ls_iterations, m.opt.solver);
                     let most = answer.states.iter().map(|s| s.iterations).max().unwrap_or(0);
                     println!(
@@ -399,7 +415,10 @@ fn foreign_models_agree_or_are_refused() {
                         agreement.in_tolerances
                     );
                     measured = format!(" | {} | {} |", bucket(agreement.worst()), answer.skipped);
-                    (AGREES, agrees(m))
+                    match cause {
+                        Some(cause) => (DIFFERS, format!("differs: {cause}")),
+                        None => (AGREES, agrees(m)),
+                    }
                 } else {
                     failures.push(format!("{}: panicked while stepping", file.id));
                     continue;
@@ -410,6 +429,8 @@ fn foreign_models_agree_or_are_refused() {
         let package = package.split('/').next().expect("a first part").to_owned();
         rows.push(Row { package, verdict, fixed: format!("| `{}` | {words}", file.id), measured });
     }
+    let count = |verdict: &str| rows.iter().filter(|row| row.verdict == verdict).count();
+    assert!(50 * count(DIFFERS) <= count(DIFFERS) + count(AGREES), "more than 2 % of the models differ");
     let text = table(&rows, same.len(), empty.len());
     if others {
         println!("{text}");
@@ -439,13 +460,22 @@ fn agrees(model: &Model) -> String {
     }
 }
 
+/// Whether MuJoCo finds some of a model's contacts by iteration.
+fn iterates(model: &Model) -> bool {
+    use GeomType::{Cylinder, Ellipsoid, Mesh};
+    let paired = |g: usize| model.pairs.iter().any(|pair| pair.geoms.contains(&g));
+    let collides = |g: usize| model.geoms[g].contype | model.geoms[g].conaffinity != 0 || paired(g);
+    (0..model.geoms.len()).any(|g| matches!(model.geoms[g].kind, Ellipsoid | Cylinder | Mesh) && collides(g))
+}
+
 /// The problem of a loaded model, if any.
 fn disagreement(id: &str, model: &Model, a: &Agreement) -> Option<String> {
     let mut wrong = Vec::new();
     if a.contacts > 0 {
         wrong.push(format!("contacts differ in {} states", a.contacts));
     }
-    wrong.extend(a.errors.iter().filter(|(_, e)| **e > BOUND).map(|(what, e)| format!("{what} {e:.0e}")));
+    let bound = if iterates(model) { ITERATED_BOUND } else { BOUND };
+    wrong.extend(a.errors.iter().filter(|(_, e)| **e > bound).map(|(what, e)| format!("{what} {e:.0e}")));
     // the other solvers converge slowly: their caps stop them within a few tolerances
     let allowed = if model.opt.solver == Solver::Newton { 1.0 } else { 10.0 };
     if !(a.in_tolerances <= allowed) {
