@@ -5,7 +5,7 @@
 # are skipped, so an interrupted run continues. Needs `cargo login` or CARGO_REGISTRY_TOKEN.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-crates=(marathon-assets marathon-configs marathon-policies marathon-physics marathon-motion marathon-envs marathon-learn marathon-render marathon-skin marathon-config marathon-mlagents
+crates=(marathon-assets marathon-configs marathon-policies marathon-physics marathon-motion marathon-envs marathon-learn marathon-render marathon-skin marathon-viewer marathon-config marathon-mlagents
   marathon-runs marathon-rl marathon-cli bevy_marathon marathon-game)
 case "${1:-}" in
   '') dry='' ;;

@@ -4,7 +4,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 site=target/site
 docs/serve.sh --build
-crates=(marathon-physics marathon-motion marathon-envs marathon-learn marathon-render marathon-skin marathon-config marathon-mlagents
+crates=(marathon-physics marathon-motion marathon-envs marathon-learn marathon-render marathon-skin marathon-viewer marathon-config marathon-mlagents
   marathon-runs marathon-rl)
 # pages of crates that are gone would stay
 rm -rf "$site" target/api
