@@ -6,7 +6,7 @@ import { brotliCompressSync, constants } from "node:zlib";
 import wabt from "wabt";
 
 /** Largest size in Brotli, quality 11, bytes: 5 % above that of November 2026. */
-const MOST = { relaxed: 1_265_000, exact: 1_400_000, "relaxed-play": 915_000, "exact-play": 1_020_000 };
+const MOST = { relaxed: 1_320_000, exact: 1_470_000, "relaxed-play": 966_000, "exact-play": 1_080_000 };
 /** Relaxed instructions that the lanes ask for. */
 const ASKED = new Set(["f32x4.relaxed_madd", "f32x4.relaxed_nmadd", "i32x4.relaxed_laneselect"]);
 const FEATURES = { simd: true, relaxed_simd: true };
