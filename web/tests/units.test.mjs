@@ -81,3 +81,32 @@ test("time is made up for a few steps and then dropped", async () => {
   clock.step();
   assert.equal(clock.steps(0), 1);
 });
+
+test("units: messages of a program come whole, however their bytes are cut", async () => {
+  const { Parser } = await source("live/messages.ts");
+  const message = (kind, content) => {
+    const head = Buffer.alloc(5);
+    head.writeUInt32LE(content.length);
+    head[4] = kind;
+    return Buffer.concat([head, content]);
+  };
+  const model = { geoms: [{}], bodies: [{}, {}] };
+  const scene = Buffer.from(JSON.stringify({ title: "Hopper", model, agents: 2, dt: 0.02 }));
+  const numbers = Float32Array.from({ length: 96 }, (_, i) => i);
+  const frame = Buffer.concat([Buffer.from(new Float64Array([1.5]).buffer), Buffer.from(new Uint32Array([3, 4]).buffer), Buffer.from(numbers.buffer)]);
+  const ground = Buffer.concat([Buffer.from(new Uint32Array([1, 0]).buffer), Buffer.from(new Float32Array([0.25, 0.5]).buffer)]);
+  const all = Buffer.concat([message(1, scene), message(4, ground), message(5, Buffer.alloc(0)), message(2, frame)]);
+  for (const size of [1, 7, 64, all.length]) {
+    const parser = new Parser();
+    const found = [];
+    for (let at = 0; at < all.length; at += size) found.push(...parser.push(new Uint8Array(all.subarray(at, at + size))));
+    assert.deepEqual(found.map(({ type }) => type), ["scene", "ground", "frame"], `${size} bytes`);
+    const [{ agents }, { agent, heights }, { time, episodes, geoms, bodies }] = found;
+    assert.deepEqual([agents, agent, [...heights], time, [...episodes]], [2, 1, [0.25, 0.5], 1.5, [3, 4]]);
+    assert.deepEqual([...geoms, ...bodies], [...numbers]);
+  }
+  const broken = new Parser();
+  broken.push(new Uint8Array(message(1, scene)));
+  assert.throws(() => broken.push(new Uint8Array(message(2, frame.subarray(8)))), /a frame has 392 bytes, expected 400/);
+  assert.throws(() => new Parser().push(new Uint8Array([255, 255, 255, 255, 2])), /at most/);
+});
