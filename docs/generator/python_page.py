@@ -14,7 +14,7 @@ GROUPS = {
     "Training and policies": ("train", "TrainResult", "Policy", "load_policy", "evaluate"),
     "Your own agents": ("MarathonAgent", "ResetNoise", "Streams", "Tolerance"),
     "Physics": ("Model", "Simulation"),
-    "Clips and images": ("Clip", "Renderer"),
+    "Clips and images": ("Clip", "Renderer", "Viewer"),
 }
 """Names of the package by their purpose; others follow under "Other names"."""
 ARGUMENTS = {"Streams": "_arrays"}
