@@ -2,6 +2,7 @@
 
 import json
 import struct
+import time
 import urllib.error
 import urllib.request
 from pathlib import Path
@@ -48,6 +49,8 @@ def test_steps_are_shown(page):
     assert viewer.watched
     rng, frame = np.random.default_rng(0), first
     while struct.unpack_from("<d", frame)[0] < 0.5:
+        # at most 60 frames a second
+        time.sleep(0.02)
         env.step(rng.uniform(-1, 1, (20, env.spec.act_size)).astype(np.float32))
         frame = of_kind(stream, FRAME)
     shown = np.frombuffer(frame, "<f4", offset=8 + 16 * 4)

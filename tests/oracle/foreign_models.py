@@ -45,6 +45,10 @@ NUDGE = 1e-9
 LARGEST_AMPLIFICATION = 1e5
 # with height fields, MuJoCo's iterative collision functions are run to the end: the closed forms here are exact
 CCD_TOLERANCE, CCD_ITERATIONS = 1e-15, 1000
+# of models whose contacts are found by iteration, states are nudged this often: ties between contacts are common
+NUDGES = 8
+# contacts of an iteration that are less deep may point anywhere, m
+SHALLOW = 2e-6
 # draws per state that is asked for
 PATIENCE = 10
 
@@ -138,21 +142,46 @@ def forward(model, data, state):
     mujoco.mj_forward(model, data)
 
 
+def iterates(model):
+    """Whether some contacts are found by iteration: geoms of these types collide."""
+    iterated = [mujoco.mjtGeom.mjGEOM_ELLIPSOID, mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_MESH]
+    collides = (model.geom_contype | model.geom_conaffinity) != 0
+    collides[model.pair_geom1] = collides[model.pair_geom2] = True
+    return bool(np.any(np.isin(model.geom_type, iterated) & collides))
+
+
+def own_error(model, data, state):
+    """Relative change of the acceleration if the iteration for contacts goes on to the end."""
+    forward(model, data, state)
+    acc = data.qacc.copy()
+    exact = copy.copy(model)
+    exact.opt.ccd_tolerance, exact.opt.ccd_iterations = CCD_TOLERANCE, CCD_ITERATIONS
+    forward(exact, data, state)
+    return float(np.linalg.norm(data.qacc - acc) / max(np.linalg.norm(acc), 1.0))
+
+
 def state_of(model, data, rng):
     """A random state with what follows from it, or None where MuJoCo's answer is not well defined."""
+    iterated = iterates(model)
     q, v, u = dynamics.random_state(model, rng, near_floor=True)
     act = rng.uniform(-0.5, 0.5, model.na).astype(np.float32)
     forward(model, data, (q, v, u, act))
     acc, contacts = data.qacc.copy(), data.ncon
     if warned(data) or not np.isfinite(acc).all() or np.abs(acc).max(initial=0.0) > LARGEST_ACCELERATION:
         return None
-    # on the edge between two sets of contacts, or where they are ill-conditioned, any rounding changes the answer
-    nudged = q.copy()
-    mujoco.mj_integratePos(model, nudged, rng.normal(size=model.nv), NUDGE)
-    forward(model, data, (nudged, v, u, act))
-    change = np.linalg.norm(data.qacc - acc) / max(np.linalg.norm(acc), 1.0)
-    if data.ncon != contacts or change > LARGEST_AMPLIFICATION * NUDGE:
+    if data.solver_niter.max(initial=0) >= model.opt.iterations >= 50:
+        # the solver has not converged
         return None
+    if iterated and np.any(np.abs(data.contact.dist - data.contact.includemargin) < SHALLOW):
+        return None
+    # on the edge between two sets of contacts, or where they are ill-conditioned, any rounding changes the answer
+    for _ in range(NUDGES if iterated else 1):
+        nudged = q.copy()
+        mujoco.mj_integratePos(model, nudged, rng.normal(size=model.nv), NUDGE)
+        forward(model, data, (nudged, v, u, act))
+        change = np.linalg.norm(data.qacc - acc) / max(np.linalg.norm(acc), 1.0)
+        if data.ncon != contacts or change > LARGEST_AMPLIFICATION * NUDGE:
+            return None
     sensors = []
     for by in [NUDGE, -NUDGE]:
         shifted = copy.copy(model)
@@ -164,6 +193,7 @@ def state_of(model, data, rng):
         if data.ncon != contacts:
             return None
         sensors.append(data.sensordata.copy())
+    error = own_error(model, data, (q, v, u, act)) if iterated else 0.0
     forward(model, data, (q, v, u, act))
     jumps = [np.abs(s - data.sensordata) > LARGEST_AMPLIFICATION * NUDGE * (1 + np.abs(s)) for s in sensors]
     state = {
@@ -171,6 +201,7 @@ def state_of(model, data, rng):
         "qvel": v.tolist(),
         "ctrl": u.tolist(),
         "act": act.tolist(),
+        "own_error": error,
         "qacc": data.qacc.tolist(),
         "qfrc_constraint": data.qfrc_constraint.tolist(),
         "ncon": int(np.sum(data.contact.exclude == 0)),

@@ -71,6 +71,8 @@ struct State {
     next_qpos: Vec<f64>,
     next_qvel: Vec<f64>,
     next_act: Vec<f64>,
+    /// Relative error of the acceleration that MuJoCo's iteration for contacts has.
+    own_error: f64,
     /// Acceleration under the file's own settings, and the solver's number of iterations.
     own: Vec<f64>,
     iterations: usize,
@@ -118,9 +120,10 @@ struct Agreement {
 }
 
 impl Agreement {
-    fn add(&mut self, what: &str, got: &[f64], want: &[f64], floor: f64) {
+    /// `scale` divides the error.
+    fn add(&mut self, what: &str, got: &[f64], want: &[f64], scale: f64) {
         let error = self.errors.entry(what.to_owned()).or_default();
-        *error = error.max(distance(got, want, floor));
+        *error = error.max(distance(got, want, 1.0) / scale);
     }
 
     fn worst(&self) -> f64 {
@@ -226,21 +229,23 @@ fn compare(loaded: &Loaded, states: &[State]) -> Agreement {
         group.act.copy_from_slice(&state.act);
         sim.forward(&mut work, &group);
         let r = Readings::new(sim, &group, &work);
+        // where MuJoCo's own answer has an error above the bound, agreement is within that error
+        let scale = (state.own_error / ITERATED_BOUND).max(1.0);
         let acc: Vec<f64> = (0..model.nv).map(|d| r.qacc(d)).collect();
-        out.add("acceleration", &acc, &state.qacc, 1.0);
-        out.add("constraint force", &r.constraint_forces(), &state.qfrc_constraint, 1.0);
+        out.add("acceleration", &acc, &state.qacc, scale);
+        out.add("constraint force", &r.constraint_forces(), &state.qfrc_constraint, scale);
         out.contacts += usize::from(r.contact_count() as usize != state.ncon);
         for (i, sensor) in model.sensors.iter().enumerate() {
             let Some(values) = r.sensor(i) else { continue };
             let want = &state.sensordata[sensor.adr..sensor.adr + values.len()];
             if let Some(want) = want.iter().copied().collect::<Option<Vec<f64>>>() {
-                out.add(&format!("sensor '{}'", sensor.name), &values, &want, 1.0);
+                out.add(&format!("sensor '{}'", sensor.name), &values, &want, scale);
             }
         }
         sim.step(&mut work, &mut group, 1);
-        out.add("next position", &group.qpos, &state.next_qpos, 1.0);
-        out.add("next velocity", &group.qvel, &state.next_qvel, 1.0);
-        out.add("next activation", &group.act, &state.next_act, 1.0);
+        out.add("next position", &group.qpos, &state.next_qpos, scale);
+        out.add("next velocity", &group.qvel, &state.next_qvel, scale);
+        out.add("next activation", &group.act, &state.next_act, scale);
     }
     out
 }
@@ -318,8 +323,9 @@ controls. A model *agrees* if these quantities equal MuJoCo's in double precisio
 * after the same number of iterations, where the file's cap ends MuJoCo's iteration early;
 * within the file's tolerance where the iteration converges, and to 1e-8 when both solve to the end.
 
-Models with ellipsoids, cylinders or meshes that collide agree to 1e-6: MuJoCo finds their contacts by an iteration that stops at this
-tolerance. The few that differ by more are marked, with the cause.
+Models with ellipsoids, cylinders or meshes that collide agree to 1e-6, or to the error of MuJoCo's own answer where that is larger: MuJoCo finds
+their contacts by an iteration that stops at this tolerance. The few that differ by more are marked, with the cause. Of these models, states
+are drawn again if any of eight changes of position by 1e-9 changes the contacts, or if a contact is less than 2 micrometers deep.
 
 The column *error* bounds the largest relative error of all these. States in which MuJoCo has no definite answer are drawn again: those
 with accelerations above 1e8, and those in which a change of position by 1e-9 changes the contacts or the acceleration by more than 1e-4.
@@ -478,7 +484,8 @@ fn disagreement(id: &str, model: &Model, a: &Agreement) -> Option<String> {
     wrong.extend(a.errors.iter().filter(|(_, e)| **e > bound).map(|(what, e)| format!("{what} {e:.0e}")));
     // the other solvers converge slowly: their caps stop them within a few tolerances
     let allowed = if model.opt.solver == Solver::Newton { 1.0 } else { 10.0 };
-    if !(a.in_tolerances <= allowed) {
+    // contacts that are found by iteration have larger errors than the solver
+    if !iterates(model) && !(a.in_tolerances <= allowed) {
         wrong.push(format!("under its own settings {:.0e} tolerances", a.in_tolerances));
     }
     if !wrong.is_empty() && !converges(model) {

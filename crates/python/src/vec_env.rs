@@ -514,7 +514,7 @@ impl VecEnv {
         // rows of agents that go on are carried over into a copy
         self.arrays.write_obs(py, self.copy, |obs| f(env, obs))?.map_err(error::env)?;
         if let Some(shown) = &mut self.shown {
-            shown.restarted(env, |_| true)?;
+            shown.reset(env)?;
         }
         self.ready = true;
         Ok(self.arrays.obs(py))

@@ -101,13 +101,19 @@ impl Shown {
             last: None,
             shared: shared.clone(),
         };
-        shown.restarted(env, |_| true)?;
-        shown.show(env)?;
+        shown.reset(env)?;
         Ok((shown, Viewer { shared, url }))
     }
 
+    /// Takes in that all agents may be somewhere else, and shows them at once.
+    pub fn reset(&mut self, env: &mut VecEnv) -> PyResult<()> {
+        self.restarted(env, |_| true)?;
+        self.last = None;
+        self.show(env)
+    }
+
     /// Takes in that agents are at new starts.
-    pub fn restarted(&mut self, env: &mut VecEnv, which: impl Fn(usize) -> bool) -> PyResult<()> {
+    fn restarted(&mut self, env: &mut VecEnv, which: impl Fn(usize) -> bool) -> PyResult<()> {
         for agent in (0..self.agents).filter(|agent| which(*agent)) {
             self.episodes[agent] = self.episodes[agent].wrapping_add(1);
             self.ended[agent] = false;
@@ -117,7 +123,6 @@ impl Shown {
                 viewer.ground(agent, field, &env.ground(agent, field).map_err(error::env)?);
             }
         }
-        self.last = None;
         Ok(())
     }
 
@@ -126,24 +131,14 @@ impl Shown {
         self.time += self.dt;
         let before = self.ended.clone();
         match self.autoreset {
-            Autoreset::SameStep => self.begun(env, &ended)?,
+            Autoreset::SameStep => self.restarted(env, &ended)?,
             Autoreset::NextStep => {
-                self.begun(env, |agent| before[agent])?;
+                self.restarted(env, |agent| before[agent])?;
                 (0..self.agents).for_each(|agent| self.ended[agent] = ended(agent));
             }
             Autoreset::Disabled => {}
         }
         self.show(env)
-    }
-
-    /// Like [`Shown::restarted`], but keeps the pace of frames.
-    fn begun(&mut self, env: &mut VecEnv, which: impl Fn(usize) -> bool) -> PyResult<()> {
-        let last = self.last;
-        if (0..self.agents).any(&which) {
-            self.restarted(env, which)?;
-        }
-        self.last = last;
-        Ok(())
     }
 
     /// Shows the present states if a page is open and the last frame was long enough ago.
