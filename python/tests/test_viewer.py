@@ -27,7 +27,10 @@ def messages(url):
     """Yield the messages of a viewer: kind and content."""
     address, token = url.split("/#/live?token=")
     with urllib.request.urlopen(f"{address}/live?token={token}", timeout=30) as stream:
+        end = time.monotonic() + 30
         while head := stream.read(5):
+            # the server says every two seconds that it is there
+            assert time.monotonic() < end, "the message does not come"
             length, kind = struct.unpack("<IB", head)
             yield kind, stream.read(length)
 
