@@ -12,7 +12,8 @@ Otherwise reads JSON from standard input. For `null`, prints the list of the fil
      "nq": .., "nv": .., "nu": .., "ngeom": .., "features": [..]}
 For a list of jobs {"xml": path, "states": n, "seed": s}, prints random states as dynamics.py does, but
 only those in which MuJoCo's answer is well defined:
-    {"states": [..], "skipped": states that were drawn and left out}
+    {"states": [..], "skipped": states that were drawn and left out,
+     "iterates": whether some contacts are found by iteration}
 The solver's settings are those of the file. Where they let it converge, the answers are those of the same problem solved to
 the end, and `own` is the acceleration under the file's settings, with the number of iterations.
 Sensor values that rounding decides are null.
@@ -238,7 +239,7 @@ def run(job):
         forward(own, data, [s[k] for k in ("qpos", "qvel", "ctrl", "act")])
         s["own"] = data.qacc.tolist()
         s["iterations"] = int(data.solver_niter.max())
-    return {"states": states, "skipped": len(draws) - len(states)}
+    return {"states": states, "skipped": len(draws) - len(states), "iterates": iterates(own)}
 
 
 if __name__ == "__main__":

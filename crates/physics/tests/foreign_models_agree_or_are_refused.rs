@@ -17,7 +17,7 @@ mod common;
 
 use common::numbers::{distance, largest};
 use marathon_physics::mjcf::{MjcfError, MjcfErrorKind};
-use marathon_physics::model::{GeomType, Solver};
+use marathon_physics::model::Solver;
 use marathon_physics::{Group, Model, Readings, Sim, SimError, SimOptions, Work};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -100,6 +100,8 @@ struct Answer {
     states: Vec<State>,
     /// States that were drawn and left out.
     skipped: usize,
+    /// Whether MuJoCo finds some of the model's contacts by iteration.
+    iterates: bool,
 }
 
 /// Result of a file.
@@ -230,7 +232,8 @@ fn in_tolerances(sim: &Sim<f64>, states: &[State]) -> f64 {
 }
 
 /// Compares a model with MuJoCo on the states.
-fn compare(loaded: &Loaded, states: &[State]) -> Agreement {
+fn compare(loaded: &Loaded, answer: &Answer) -> Agreement {
+    let states = &answer.states;
     let mut out = Agreement::default();
     if loaded.to_the_end.is_some() {
         out.in_tolerances = in_tolerances(&loaded.own, states);
@@ -266,7 +269,7 @@ fn compare(loaded: &Loaded, states: &[State]) -> Agreement {
         out.add("next activation", &group.act, &state.next_act, scale);
         each.push(out);
     }
-    let mut may_differ = if iterates(model) { TIES } else { 0 };
+    let mut may_differ = if answer.iterates { TIES } else { 0 };
     for state in each {
         if may_differ > 0 && (state.contacts > 0 || !(state.worst() <= ITERATED_BOUND)) {
             may_differ -= 1;
@@ -436,9 +439,9 @@ fn foreign_models_agree_or_are_refused() {
                     .expect("states of a model");
                 if answer.states.is_empty() {
                     (STILL, "loads; rounding decides what it touches".into())
-                } else if let Ok(agreement) = catch_unwind(AssertUnwindSafe(|| compare(loaded, &answer.states))) {
+                } else if let Ok(agreement) = catch_unwind(AssertUnwindSafe(|| compare(loaded, &answer))) {
                     let cause = DIFFERING.iter().find(|(id, _)| *id == file.id).map(|(_, cause)| *cause);
-                    let problem = disagreement(&file.id, m, &agreement);
+                    let problem = disagreement(&file.id, m, answer.iterates, &agreement);
                     match (problem, cause) {
                         (Some(problem), None) => failures.push(problem),
                         (None, Some(_)) => println!("{}: agrees, although it is listed as differing", file.id),
@@ -499,26 +502,18 @@ fn agrees(model: &Model) -> String {
     }
 }
 
-/// Whether MuJoCo finds some of a model's contacts by iteration.
-fn iterates(model: &Model) -> bool {
-    use GeomType::{Cylinder, Ellipsoid, Mesh};
-    let paired = |g: usize| model.pairs.iter().any(|pair| pair.geoms.contains(&g));
-    let collides = |g: usize| model.geoms[g].contype | model.geoms[g].conaffinity != 0 || paired(g);
-    (0..model.geoms.len()).any(|g| matches!(model.geoms[g].kind, Ellipsoid | Cylinder | Mesh) && collides(g))
-}
-
 /// The problem of a loaded model, if any.
-fn disagreement(id: &str, model: &Model, a: &Agreement) -> Option<String> {
+fn disagreement(id: &str, model: &Model, iterates: bool, a: &Agreement) -> Option<String> {
     let mut wrong = Vec::new();
     if a.contacts > 0 {
         wrong.push(format!("contacts differ in {} states", a.contacts));
     }
-    let bound = if iterates(model) { ITERATED_BOUND } else { BOUND };
+    let bound = if iterates { ITERATED_BOUND } else { BOUND };
     wrong.extend(a.errors.iter().filter(|(_, e)| **e > bound).map(|(what, e)| format!("{what} {e:.0e}")));
     // the other solvers converge slowly: their caps stop them within a few tolerances
     let allowed = if model.opt.solver == Solver::Newton { 1.0 } else { 10.0 };
     // contacts that are found by iteration have larger errors than the solver
-    if !iterates(model) && !(a.in_tolerances <= allowed) {
+    if !iterates && !(a.in_tolerances <= allowed) {
         wrong.push(format!("under its own settings {:.0e} tolerances", a.in_tolerances));
     }
     if !wrong.is_empty() && !converges(model) {

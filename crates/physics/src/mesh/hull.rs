@@ -5,8 +5,8 @@
 //! whatever the points are.
 
 use super::grid::{Grid, Plane};
-use super::vector::{cross, dot, norm, sub};
 use crate::model::Vec3;
+use crate::model::vector::{MIN_VAL, cross, dot, norm, sub};
 use std::collections::BinaryHeap;
 
 const NONE: u32 = u32::MAX;
@@ -14,8 +14,6 @@ const NONE: u32 = u32::MAX;
 const MOST_WORK: u64 = 300_000_000;
 /// Most corners.
 const MOST_CORNERS: usize = 1 << 17;
-/// Smaller distances count as zero (MuJoCo's `mjMINVAL`).
-const SMALLEST: f64 = 1e-15;
 
 struct Face {
     corners: [u32; 3],
@@ -110,16 +108,16 @@ fn check_extent(vertices: &[[f32; 3]]) -> Result<(), String> {
     let at = |i: usize| vertices[i].map(f64::from);
     let first = at(0);
     let vectors = || (1..vertices.len()).map(|i| sub(at(i), first));
-    let Some(edge) = vectors().find(|v| norm(*v) > SMALLEST) else {
+    let Some(edge) = vectors().find(|v| norm(*v) > MIN_VAL) else {
         return Err(flat("all vertices are the same point; use a small sphere"));
     };
     let long = norm(edge);
-    let normal = |v: Vec3| Some(cross(edge, v)).filter(|n| norm(*n) > SMALLEST * long * norm(v));
-    let Some(normal) = vectors().filter(|v| norm(*v) >= SMALLEST).find_map(normal) else {
+    let normal = |v: Vec3| Some(cross(edge, v)).filter(|n| norm(*n) > MIN_VAL * long * norm(v));
+    let Some(normal) = vectors().filter(|v| norm(*v) >= MIN_VAL).find_map(normal) else {
         return Err(flat("all vertices are on one line; use a thin capsule"));
     };
     let normal = normal.map(|x| x / norm(normal));
-    if vectors().all(|v| dot(normal, v).abs() <= SMALLEST * long) { Err(in_plane()) } else { Ok(()) }
+    if vectors().all(|v| dot(normal, v).abs() <= MIN_VAL * long) { Err(in_plane()) } else { Ok(()) }
 }
 
 fn flat(what: &str) -> String {

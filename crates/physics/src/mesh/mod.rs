@@ -12,7 +12,6 @@ mod msh;
 mod obj;
 pub(crate) mod polygons;
 mod stl;
-mod vector;
 
 #[cfg(test)]
 mod tests;

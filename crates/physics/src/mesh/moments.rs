@@ -4,11 +4,8 @@
 //! the moments of a tetrahedron: F. Tonon, "Explicit exact formulas for the 3-D tetrahedron inertia tensor", 2004; the terms here are
 //! added up in MuJoCo's order.
 
-use super::vector::{add_scaled, cross, dot, norm, sub};
 use crate::model::Vec3;
-
-/// Smaller areas and volumes count as zero (MuJoCo's `mjMINVAL`).
-pub(crate) const SMALLEST: f64 = 1e-15;
+use crate::model::vector::{MIN_VAL, add, cross, dot, norm, scale, sub};
 
 /// The rule for what is inside a mesh (`inertia`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,6 +18,17 @@ pub(crate) enum Inside {
     Legacy,
     /// Nothing: the mass is spread over the surface.
     Shell,
+}
+
+impl Inside {
+    /// Area of a triangle of a shell, else volume of the pyramid over it. `arm`: from the apex to the triangle's center.
+    fn weight(self, arm: Vec3, normal: Vec3, area: f64) -> f64 {
+        match self {
+            Inside::Shell => area,
+            Inside::Legacy => (dot(arm, normal) * area / 3.0).abs(),
+            Inside::Exact | Inside::Convex => dot(arm, normal) * area / 3.0,
+        }
+    }
 }
 
 /// Volume (or area of a shell), center of mass, and moments about it for density 1: `[xx, yy, zz, xy, xz, yz]`.
@@ -36,7 +44,7 @@ fn triangle([a, b, c]: [Vec3; 3]) -> (Vec3, Vec3, f64) {
     let center = [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0);
     let normal = cross(sub(b, a), sub(c, a));
     let length = norm(normal);
-    if length < SMALLEST { (center, normal, 0.0) } else { (center, normal.map(|x| x / length), 0.5 * length) }
+    if length < MIN_VAL { (center, normal, 0.0) } else { (center, normal.map(|x| x / length), 0.5 * length) }
 }
 
 /// Centroid and area of a surface.
@@ -44,10 +52,10 @@ fn centroid(vertices: &[Vec3], faces: &[[u32; 3]]) -> (Vec3, f64) {
     let (mut sum, mut total) = ([0.0; 3], 0.0);
     for face in faces {
         let (center, _, area) = triangle(face.map(|v| vertices[v as usize]));
-        add_scaled(&mut sum, center, area);
+        sum = add(sum, scale(center, area));
         total += area;
     }
-    (if total >= SMALLEST { sum.map(|x| x / total) } else { sum }, total)
+    (if total >= MIN_VAL { sum.map(|x| x / total) } else { sum }, total)
 }
 
 /// Integrates over a mesh. `solid`: the faces of the solid, which are those of the hull for [`Inside::Convex`], else `surface`.
@@ -61,25 +69,21 @@ pub(crate) fn moments(
     inside: Inside,
 ) -> Result<Moments, String> {
     let (apex, area) = centroid(vertices, surface);
-    if !(area >= SMALLEST) {
-        return Err(format!("the area of its surface is {area:e}, expected at least {SMALLEST:e}"));
+    if !(area >= MIN_VAL) {
+        return Err(format!("the area of its surface is {area:e}, expected at least {MIN_VAL:e}"));
     }
     let (mut center, mut total) = ([0.0; 3], 0.0);
     for face in solid {
         let (middle, normal, area) = triangle(face.map(|v| vertices[v as usize]));
-        let weight = match inside {
-            Inside::Shell => area,
-            Inside::Legacy => (dot(sub(middle, apex), normal) * area / 3.0).abs(),
-            Inside::Exact | Inside::Convex => dot(sub(middle, apex), normal) * area / 3.0,
-        };
+        let weight = inside.weight(sub(middle, apex), normal, area);
         total += weight;
         for k in 0..3 {
             center[k] += weight * (middle[k] * 3.0 / 4.0 + apex[k] / 4.0);
         }
     }
-    if !(total >= SMALLEST) {
+    if !(total >= MIN_VAL) {
         let hint = if total < 0.0 { "its triangles face inward" } else { "inertia=\"shell\" weighs its surface" };
-        return Err(format!("its volume is {total:e}, expected at least {SMALLEST:e}; {hint}"));
+        return Err(format!("its volume is {total:e}, expected at least {MIN_VAL:e}; {hint}"));
     }
     let center = center.map(|x| x / total);
     let (volume, inertia) = second_moments(vertices, solid, center, inside);
@@ -93,11 +97,7 @@ fn second_moments(vertices: &[Vec3], faces: &[[u32; 3]], center: Vec3, inside: I
     for face in faces {
         let corners = face.map(|v| sub(vertices[v as usize], center));
         let (middle, normal, area) = triangle(corners);
-        let volume = match inside {
-            Inside::Shell => area,
-            Inside::Legacy => (dot(middle, normal) * area / 3.0).abs(),
-            Inside::Exact | Inside::Convex => dot(middle, normal) * area / 3.0,
-        };
+        let volume = inside.weight(middle, normal, area);
         total += volume;
         let share = volume / if inside == Inside::Shell { 12.0 } else { 20.0 };
         let [d, e, f] = corners;
@@ -118,7 +118,7 @@ fn second_moments(vertices: &[Vec3], faces: &[[u32; 3]], center: Vec3, inside: I
 
 /// Two corners of an edge that two faces pass in the same direction, if any; faces that are too small are left out.
 pub(crate) fn inconsistent_edge(vertices: &[Vec3], faces: &[[u32; 3]]) -> Option<[u32; 2]> {
-    let large = faces.iter().filter(|f| triangle(f.map(|v| vertices[v as usize])).2 > SMALLEST.sqrt());
+    let large = faces.iter().filter(|f| triangle(f.map(|v| vertices[v as usize])).2 > MIN_VAL.sqrt());
     let mut edges: Vec<[u32; 2]> = large.flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
     edges.sort_unstable();
     edges.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0])

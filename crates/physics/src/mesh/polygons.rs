@@ -4,8 +4,8 @@
 //! Facets side by side whose normals fall into one cell of a grid of angles are one polygon, as in MuJoCo.
 
 use super::grid::Grid;
-use super::vector::{cross, norm, sub};
 use super::{Triangles, hull};
+use crate::model::vector::{add, cross, norm, sub};
 use crate::model::{Hull, Vec3};
 use std::collections::HashMap;
 use std::f64::consts::PI;
@@ -68,10 +68,7 @@ fn normal(polygon: &[u32], at: impl Fn(u32) -> Vec3) -> Vec3 {
     let first = at(polygon[0]);
     let mut sum = [0.0; 3];
     for pair in polygon[1..].windows(2) {
-        let part = cross(sub(at(pair[0]), first), sub(at(pair[1]), first));
-        for k in 0..3 {
-            sum[k] += part[k];
-        }
+        sum = add(sum, cross(sub(at(pair[0]), first), sub(at(pair[1]), first)));
     }
     let length = norm(sum);
     sum.map(|x| x / length)

@@ -1,11 +1,10 @@
 //! Rotations, frames and principal axes, in `f64`.
 
+pub(crate) use crate::model::vector::{MIN_VAL, add, cross, dot, norm, scale, sub};
 use crate::model::{Quat, Vec3};
 
 /// Vectors shorter than this have no direction; MuJoCo's `mjEPS`.
 pub(crate) const EPS: f64 = 1e-14;
-/// Masses and inertias below this count as zero; MuJoCo's `mjMINVAL`.
-pub(crate) const MIN_VAL: f64 = 1e-15;
 
 /// The rotation that does nothing.
 pub(crate) const IDENTITY: Quat = [1.0, 0.0, 0.0, 0.0];
@@ -29,30 +28,6 @@ impl Frame {
     pub fn point(&self, p: Vec3) -> Vec3 {
         add(self.pos, rotate(self.quat, p))
     }
-}
-
-pub(crate) fn add(a: Vec3, b: Vec3) -> Vec3 {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-}
-
-pub(crate) fn sub(a: Vec3, b: Vec3) -> Vec3 {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-pub(crate) fn scale(a: Vec3, s: f64) -> Vec3 {
-    a.map(|x| x * s)
-}
-
-pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-pub(crate) fn norm(a: Vec3) -> f64 {
-    dot(a, a).sqrt()
-}
-
-pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// Unit vector, unless `a` is too short to have a direction.

@@ -11,6 +11,7 @@ mod coupling;
 mod hull;
 mod sensor;
 mod shape;
+pub(crate) mod vector;
 mod view;
 
 pub use actuator::{Actuator, Dynamics, Transmission};

@@ -278,7 +278,7 @@ impl<S: Number> Polytope<S> {
             let lower = face.square.sqrt();
             let new = couple.support(&scale(&face.foot, S::lit(1.0).div(lower)));
             let bound = dot(&face.foot, &new.point).div(lower);
-            let most = upper.map_or(bound, |upper| smaller(upper, bound));
+            let most = upper.map_or(bound, |upper| bound.min(upper));
             upper = Some(most);
             if bound - lower < tolerance {
                 if iteration == 0 && bound < lower - zero.below {

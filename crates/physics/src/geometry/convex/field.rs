@@ -39,7 +39,7 @@ pub(super) fn field_convex<S: Number>(
         for column in columns.clone() {
             for half in 0..2 {
                 let corners = prism(field, row, column, half);
-                let highest = larger(corners[3][2], larger(corners[4][2], corners[5][2]));
+                let highest = corners[5][2].max(corners[4][2]).max(corners[3][2]);
                 if highest < low[2] || high[2] < -field.base {
                     continue;
                 }

@@ -78,7 +78,7 @@ pub(super) fn nearest<S: Number>(couple: &mut Couple<S>, search: &Search<S>, cut
     let zero = S::zero();
     let discrete = couple.is_discrete();
     let floor = S::lit(if is_single::<S>() { 8.0 * S::EPSILON } else { TINY });
-    let least = if discrete { floor } else { larger(search.tolerance, floor) };
+    let least = if discrete { floor } else { floor.max(search.tolerance) };
     let enough = if discrete { zero } else { S::lit(0.5) * search.tolerance * search.tolerance };
     let witness = [couple.shapes[0].solid.inside(), couple.shapes[1].solid.inside()];
     let mut x = sub(&witness[0], &witness[1]);
@@ -100,7 +100,7 @@ pub(super) fn nearest<S: Number>(couple: &mut Couple<S>, search: &Search<S>, cut
         if !(length < least) {
             let lower = dot(&x, &new.point);
             let rounding = S::lit(if is_single::<S>() { 2.0 * S::EPSILON } else { 0.0 });
-            let enough = larger(enough, rounding * length * (length + norm(&new.point)));
+            let enough = (rounding * length * (length + norm(&new.point))).max(enough);
             if dot(&x, &sub(&x, &new.point)) < enough {
                 break;
             }

@@ -93,6 +93,6 @@ impl<'b, S: Number> Pair<'_, 'b, S> {
 
     /// Distance from which two closest points have a direction.
     fn least_line(&self) -> S {
-        if is_single::<S>() { larger(self.search.tolerance, S::lit(3e-5)) } else { self.search.tolerance }
+        if is_single::<S>() { S::lit(3e-5).max(self.search.tolerance) } else { self.search.tolerance }
     }
 }

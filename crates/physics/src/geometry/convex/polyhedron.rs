@@ -3,7 +3,7 @@
 use super::super::V3;
 use super::vector::*;
 use crate::lanes::Real;
-use crate::model::Hull;
+use crate::model::{self, Hull};
 
 /// Number of corners from which a support point is found by climbing along edges (MuJoCo's `mjMESH_HILLCLIMB_MIN`).
 const CLIMB: usize = 10;
@@ -35,8 +35,7 @@ impl Lists {
 
 /// Distance of the farthest corner of a hull from the origin.
 pub(crate) fn hull_radius(hull: &Hull) -> f64 {
-    let square = |v: &[f64; 3]| v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-    hull.vertices.iter().map(square).fold(0.0, f64::max).sqrt()
+    hull.vertices.iter().map(|v| model::vector::norm(*v)).fold(0.0, f64::max)
 }
 
 /// A convex hull in lane precision.

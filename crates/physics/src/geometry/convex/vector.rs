@@ -92,15 +92,3 @@ pub(super) fn combine<S: Number, const N: usize>(points: [&V3<S>; N], weights: &
     }
     out
 }
-
-/// The larger of two numbers.
-#[inline]
-pub(super) fn larger<S: Number>(a: S, b: S) -> S {
-    if a < b { b } else { a }
-}
-
-/// The smaller of two numbers.
-#[inline]
-pub(super) fn smaller<S: Number>(a: S, b: S) -> S {
-    if b < a { b } else { a }
-}
