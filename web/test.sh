@@ -40,7 +40,5 @@ if [ "${#missing[@]}" != 0 ] && [ "$(id -u)" = 0 ] && command -v apt-get > /dev/
 fi
 ./build.sh
 npx tsc --noEmit
-# Node 20 has relaxed SIMD behind a flag that later ones do not know
-flag=--experimental-wasm-relaxed-simd
-node "$flag" --eval '' 2> /dev/null || flag=''
-node $flag --test --test-concurrency=1 --test-reporter=spec "${names[@]}" "${files[@]}"
+. ../crates/wasm/node.sh
+node $relaxed_flag --test --test-concurrency=1 --test-reporter=spec "${names[@]}" "${files[@]}"

@@ -12,10 +12,8 @@ modules=(relaxed)
 [ "${1:-}" != --both ] || modules+=(exact)
 ./build.sh "${modules[@]}" "${modules[@]/%/-play}"
 cd npm
-# Node 20 has relaxed SIMD behind a flag that later ones do not know
-flag=--experimental-wasm-relaxed-simd
-node "$flag" --eval '' 2> /dev/null || flag=''
+. ../node.sh
 for lanes in "${modules[@]}"; do
-  MARATHON_LANES="$lanes" NODE_OPTIONS="" node $flag --test --test-reporter=spec tests/
+  MARATHON_LANES="$lanes" NODE_OPTIONS="" node $relaxed_flag --test --test-reporter=spec tests/
 done
 node reference.mjs --check

@@ -25,7 +25,10 @@ self.addEventListener("activate", (event) => {
 self.addEventListener("message", (event) => {
   const add = async () => {
     const cache = await caches.open(CACHE);
-    for (const url of event.data.loaded ?? []) {
+    const loaded = event.data.loaded ?? [];
+    // workers load the full module later, perhaps without a network
+    const full = loaded.filter((url) => url.endsWith("-play.wasm")).map((url) => url.replace("-play.wasm", ".wasm"));
+    for (const url of [...loaded, ...full]) {
       if (url.startsWith(self.registration.scope) && !(await cache.match(url))) await cache.add(url).catch(() => {});
     }
   };

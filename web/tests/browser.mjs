@@ -5,6 +5,9 @@ import { chromium } from "playwright-core";
 const CHROMIUM = process.env.CHROMIUM ?? "/usr/bin/chromium";
 export const hasChromium = existsSync(CHROMIUM);
 
+/** The module that Node compares with: the exact one, unless only the other was built. */
+export const LANES = process.env.MARATHON_MODULES === "relaxed" ? "relaxed" : "exact";
+
 export const DESKTOP = { viewport: { width: 1280, height: 720 } };
 export const PHONE = { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true, deviceScaleFactor: 2 };
 

@@ -6,6 +6,7 @@ import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
 import { load } from "marathon-rl";
 import puppeteer from "puppeteer-core";
+import { LANES } from "./browser.mjs";
 import { serve } from "./server.mjs";
 
 const FIREFOX = process.env.FIREFOX ?? ["/usr/bin/firefox-esr", "/usr/bin/firefox"].find((path) => existsSync(path));
@@ -54,7 +55,7 @@ test("Firefox loads the page, has the same bits, and steers", { skip }, async (t
   await page.goto(`${server.url}#/play?agent=Hopper`);
   await page.waitForFunction(() => document.documentElement.dataset.ready === "play", { timeout: 60_000 });
   const bytes = new Uint8Array(await readFile(new URL("../../assets/policies/HopperController.safetensors", import.meta.url)));
-  const marathon = await load({ lanes: "exact" });
+  const marathon = await load({ lanes: LANES });
   const env = marathon.env("HopperController-v0", { policy: bytes, seed: 7 });
   for (let i = 0; i < 1000; i++) env.step();
   const [hash, lanes] = await page.evaluate(async () => {

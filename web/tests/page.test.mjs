@@ -4,7 +4,7 @@ import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
 import { brotliCompressSync, constants } from "node:zlib";
 import { load } from "marathon-rl";
-import { DESKTOP, PHONE, hasChromium, launch, open, ready } from "./browser.mjs";
+import { DESKTOP, LANES, PHONE, hasChromium, launch, open, ready } from "./browser.mjs";
 import { bvh, drop } from "./drop.mjs";
 import { FOLDER, serve } from "./server.mjs";
 
@@ -79,7 +79,7 @@ test("it loads within its budget, without errors", { skip }, async (t) => {
 });
 
 test("states have the bits of Node after 1,000 steps", { skip }, async () => {
-  const marathon = await load({ lanes: process.env.MARATHON_MODULES === "relaxed" ? "relaxed" : "exact" });
+  const marathon = await load({ lanes: LANES });
   const bytes = await policy("HopperController");
   const env = marathon.env("HopperController-v0", { policy: bytes, seed: 7, agents: 2 });
   for (let i = 0; i < 1000; i++) env.step();
@@ -221,7 +221,7 @@ test("a hopper improves while it learns", { skip }, async (t) => {
   const download = page.waitForEvent("download");
   await page.getByRole("button", { name: "Download" }).click();
   const bytes = new Uint8Array(await readFile(await (await download).path()));
-  const marathon = await load({ lanes: "exact" });
+  const marathon = await load({ lanes: LANES });
   assert.equal(marathon.policyInfo(bytes).agent, "Hopper-v0");
   await page.getByRole("button", { name: "Keep" }).click();
   await page.getByRole("button", { name: "Watch" }).click();
@@ -331,7 +331,9 @@ test("it works offline after the first visit", { skip }, async () => {
   await page.waitForFunction(async () => {
     const names = await caches.keys();
     const keys = await Promise.all(names.map(async (name) => (await (await caches.open(name)).keys()).map(({ url }) => url)));
-    return keys.flat().some((url) => url.endsWith(".wasm"));
+    const modules = keys.flat().filter((url) => url.endsWith(".wasm"));
+    // that for play, and the full one for workers
+    return modules.some((url) => url.endsWith("-play.wasm")) && modules.some((url) => !url.endsWith("-play.wasm"));
   }, undefined, { timeout: 30_000 });
   await context.setOffline(true);
   await page.goto(`${server.url}?again#/play?agent=Ant`);

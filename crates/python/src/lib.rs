@@ -49,6 +49,7 @@ mod _native {
 /// Runs the `marathon` command with the words of a command line, the first being the program's name; returns its exit
 /// code. It belongs at the end of a process: some commands replace the handler of Ctrl-C.
 #[pyfunction]
-fn main(py: Python<'_>, words: Vec<OsString>) -> u8 {
-    py.detach(|| marathon_cli::main(words))
+fn main(py: Python<'_>, words: Vec<OsString>) -> PyResult<u8> {
+    viewer::offer_page(py)?;
+    Ok(py.detach(|| marathon_cli::main(words)))
 }

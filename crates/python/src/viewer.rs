@@ -3,7 +3,7 @@
 use crate::error;
 use marathon_envs::{Autoreset, VecEnv};
 use marathon_physics::Model;
-use marathon_viewer::{Frame, Poses, facts, find_page};
+use marathon_viewer::{Frame, PAGE_VARIABLE, Poses, facts, find_page};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -129,12 +129,12 @@ impl Shown {
     /// Takes in a step, after which some episodes have ended.
     pub fn stepped(&mut self, env: &mut VecEnv, ended: impl Fn(usize) -> bool) -> PyResult<()> {
         self.time += self.dt;
-        let before = self.ended.clone();
         match self.autoreset {
             Autoreset::SameStep => self.restarted(env, &ended)?,
             Autoreset::NextStep => {
+                let before = self.ended.clone();
                 self.restarted(env, |agent| before[agent])?;
-                (0..self.agents).for_each(|agent| self.ended[agent] = ended(agent));
+                self.ended = (0..self.agents).map(ended).collect();
             }
             Autoreset::Disabled => {}
         }
@@ -162,9 +162,17 @@ impl Shown {
     }
 }
 
+/// Names the page of the package to the `marathon` command, unless the environment variable names another one.
+pub fn offer_page(py: Python<'_>) -> PyResult<()> {
+    if let Some(page) = packed_page(py) {
+        py.import("os")?.getattr("environ")?.set_item(PAGE_VARIABLE, page)?;
+    }
+    Ok(())
+}
+
 /// The page that the package has brought along, unless the environment variable names another one.
 fn packed_page(py: Python<'_>) -> Option<PathBuf> {
-    if std::env::var_os("MARATHON_PAGE").is_some() {
+    if std::env::var_os(PAGE_VARIABLE).is_some() {
         return None;
     }
     let file: PathBuf = py.import("marathon_rl").ok()?.getattr("__file__").ok()?.extract().ok()?;

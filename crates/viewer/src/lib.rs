@@ -12,4 +12,4 @@ mod server;
 pub use facts::facts;
 pub use poses::Poses;
 #[cfg(feature = "server")]
-pub use server::{Frame, Viewer, ViewerError, find_page};
+pub use server::{Frame, PAGE_VARIABLE, Viewer, ViewerError, find_page};

@@ -68,6 +68,11 @@ impl Answer {
         Answer::bytes(numbers.into_iter().flat_map(|x| x.to_le_bytes()).collect())
     }
 
+    /// Numbers in single precision.
+    pub fn singles(numbers: &[f32]) -> Self {
+        Answer::bytes(numbers.iter().flat_map(|x| x.to_le_bytes()).collect())
+    }
+
     /// A hash of numbers, as 16 hexadecimal digits.
     pub fn hash(numbers: impl IntoIterator<Item = f64>) -> Self {
         Answer::bytes(format!("{:016x}", hash(numbers)).into_bytes())

@@ -377,10 +377,7 @@ pub extern "C" fn env_set_state(env: usize, agent: usize) -> i32 {
 /// Heights of a height field of an agent, m, in single precision, row by row.
 #[unsafe(no_mangle)]
 pub extern "C" fn env_ground(env: usize, agent: usize, field: usize) -> i32 {
-    ask::<Env>(env, |env, _| {
-        let heights = env.env.ground(agent, field)?;
-        Ok(Answer::bytes(heights.iter().flat_map(|x| x.to_le_bytes()).collect()))
-    })
+    ask::<Env>(env, |env, _| Ok(Answer::singles(&env.env.ground(agent, field)?)))
 }
 
 /// Sets the heights of a height field of an agent: the file `heights` has them in single precision.

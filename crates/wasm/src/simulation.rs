@@ -165,8 +165,7 @@ pub extern "C" fn simulation_ground(simulation: usize, field: usize) -> i32 {
         if field >= fields {
             return Err(format!("there is no height field {field}, the model has {fields}").into());
         }
-        let heights = simulation.batch.ground(0, field);
-        Ok(Answer::bytes(heights.iter().flat_map(|x| x.to_le_bytes()).collect()))
+        Ok(Answer::singles(&simulation.batch.ground(0, field)))
     })
 }
 

@@ -15,6 +15,9 @@ export interface Hands {
   push(picked: Picked, direction: Vector3): void;
 }
 
+/** Nothing can be pulled: the mouse turns and zooms. */
+export const NO_HANDS: Hands = { pick: () => null, grab() {}, pull() {}, letGo() {}, push() {} };
+
 /** Turn of the camera per pixel, rad. */
 const TURN = 0.006;
 /** Way of a click that is no drag, pixels. */

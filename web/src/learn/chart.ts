@@ -14,6 +14,16 @@ export interface ChartOptions {
 }
 
 const [LEFT, RIGHT, TOP, BOTTOM] = [44, 8, 8, 20];
+/** The curve of the return. */
+export function returnChart(end: number): Chart {
+  return new Chart({ label: "Return per episode", color: "--accent-line", digits: 0 }, end);
+}
+
+/** The curve of the speed. */
+export function speedChart(end: number): Chart {
+  return new Chart({ label: "Speed, m/s", color: "--second-line", digits: 2 }, end);
+}
+
 /** Most points that are drawn. */
 const MOST = 400;
 

@@ -4,8 +4,8 @@ import { MODULES } from "../app/engine";
 import { reason } from "../app/messages";
 import { integer } from "../app/route";
 import type { Context, View } from "../app/view";
-import { PointerControl } from "../input/pointer";
-import { Chart } from "./chart";
+import { NO_HANDS, PointerControl } from "../input/pointer";
+import { type Chart, returnChart, speedChart } from "./chart";
 import { Crowd } from "./crowd";
 import { keep } from "./kept";
 import type { FromWorker, ToWorker } from "./messages";
@@ -54,15 +54,13 @@ class Learn implements View {
     this.#seed = integer(params, "seed", 0, 2 ** 31 - 1, 1);
     this.#steps = integer(params, "steps", 10_000, 1e9, 1e6 * task.millions);
     this.#crowd = new Crowd(stage, marathon, { ...task, seed: this.#seed, onError: (error) => context.fail(error) });
-    // nothing to pull here: the mouse turns and zooms
-    const hands = { pick: () => null, grab() {}, pull() {}, letGo() {}, push() {} };
-    this.#pointer = new PointerControl(stage, hands);
+    this.#pointer = new PointerControl(stage, NO_HANDS);
     stage.follow.set("side", task.distance);
     stage.follow.yaw -= 0.1;
     stage.follow.turn(0.25, 0.16);
     stage.canvas.setAttribute("aria-label", `${task.agents} figures that act by the newest policy. Drag to look around.`);
-    this.#returns = new Chart({ label: "Return per episode", color: "--accent-line", digits: 0 }, this.#steps);
-    this.#speeds = new Chart({ label: "Speed, m/s", color: "--second-line", digits: 2 }, this.#steps);
+    this.#returns = returnChart(this.#steps);
+    this.#speeds = speedChart(this.#steps);
     this.#main = button("Start", () => this.#press(), { class: "primary" });
     this.#after = [
       button("Keep", () => this.#keep(), { title: "Keep the policy in this browser" }),

@@ -2,8 +2,8 @@
 import { el } from "../app/dom";
 import { reason } from "../app/messages";
 import type { Context, View } from "../app/view";
-import { PointerControl } from "../input/pointer";
-import { Chart } from "../learn/chart";
+import { NO_HANDS, PointerControl } from "../input/pointer";
+import { type Chart, returnChart, speedChart } from "../learn/chart";
 import { type Curve, type Message, Parser } from "./messages";
 import { Troupe } from "./troupe";
 
@@ -30,9 +30,7 @@ class Live implements View {
   constructor(context: Context) {
     this.#context = context;
     const { stage, panel } = context;
-    // the program is only watched: the mouse turns and zooms
-    const hands = { pick: () => null, grab() {}, pull() {}, letGo() {}, push() {} };
-    this.#pointer = new PointerControl(stage, hands);
+    this.#pointer = new PointerControl(stage, NO_HANDS);
     stage.canvas.setAttribute("aria-label", "Agents of a running program. Drag to look around.");
     panel.replaceChildren(el("h2", {}, "Live"), this.#title, this.#status, this.#charts);
     void this.#follow();
@@ -106,8 +104,8 @@ class Live implements View {
   }
 
   #draw({ total, steps, return_mean, speed_mean }: Curve): void {
-    this.#returns ??= new Chart({ label: "Return per episode", color: "--accent-line", digits: 0 }, total);
-    this.#speeds ??= new Chart({ label: "Speed, m/s", color: "--second-line", digits: 2 }, total);
+    this.#returns ??= returnChart(total);
+    this.#speeds ??= speedChart(total);
     if (this.#charts.childElementCount === 0) this.#charts.append(this.#returns.element, this.#speeds.element);
     for (const [chart, values] of [[this.#returns, return_mean], [this.#speeds, speed_mean]] as const) {
       chart.clear(Math.max(total, steps.at(-1) ?? 0));

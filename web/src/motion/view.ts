@@ -5,7 +5,7 @@ import { fetchBytes, pageUrl, policy } from "../app/engine";
 import { type GivenFile, baseName, extension, fileButton } from "../app/files";
 import { type Context, type View, shown } from "../app/view";
 import { Keyboard } from "../input/keyboard";
-import { PointerControl } from "../input/pointer";
+import { NO_HANDS, PointerControl } from "../input/pointer";
 import { Player } from "../play/player";
 import { ClipPlayer } from "./clip";
 import { type Import, startImport } from "./import";
@@ -101,8 +101,7 @@ class Motion implements View {
   #play(clip: Clip): void {
     const { stage } = this.#context;
     this.#player = new ClipPlayer(stage, clip);
-    const hands = { pick: () => null, grab() {}, pull() {}, letGo() {}, push() {} };
-    this.#pointer = new PointerControl(stage, hands);
+    this.#pointer = new PointerControl(stage, NO_HANDS);
     stage.show(this.#player);
   }
 

@@ -95,6 +95,11 @@ impl<'a> Folder<'a> {
         path.metadata().and_then(|file| file.modified()).ok()
     }
 
+    /// Whether there is a newer policy than the last one read.
+    fn is_newer(&self) -> bool {
+        self.written().is_some_and(|written| self.seen != Some(written))
+    }
+
     fn load(&mut self) -> Result<Loaded, CliError> {
         self.seen = self.written();
         let (policies, factory) = self.source.load_all()?;
@@ -106,7 +111,7 @@ impl<'a> Folder<'a> {
     /// Waits for the next policy. `None` after Ctrl-C.
     fn wait(&mut self, viewer: &Viewer) -> Result<Option<Loaded>, CliError> {
         while !interrupt::requested() {
-            if self.written() != self.seen {
+            if self.is_newer() {
                 return self.load().map(Some);
             }
             self.show_progress(viewer);
@@ -164,7 +169,7 @@ impl Loaded {
             if look <= Instant::now() {
                 look = Instant::now() + LOOK;
                 folder.show_progress(viewer);
-                if interrupt::requested() || folder.written() != folder.seen && folder.written().is_some() {
+                if interrupt::requested() || folder.is_newer() {
                     return Ok(time);
                 }
             }

@@ -7,7 +7,7 @@ use std::io::{Result, Write};
 use std::path::{Component, Path, PathBuf};
 
 /// Environment variable with the folder of the page.
-const VARIABLE: &str = "MARATHON_PAGE";
+pub const PAGE_VARIABLE: &str = "MARATHON_PAGE";
 
 /// Finds the folder of the page. A given folder counts first, then the environment variable `MARATHON_PAGE`. Without them, it
 /// is `page` beside the program, `share/marathon/page` above its folder, or `web/dist` in the present folder.
@@ -15,7 +15,7 @@ const VARIABLE: &str = "MARATHON_PAGE";
 /// # Errors
 /// If it is in none of them.
 pub fn find_page(given: Option<&Path>) -> std::result::Result<PathBuf, ViewerError> {
-    if let Some(folder) = given.map(Path::to_path_buf).or_else(|| std::env::var_os(VARIABLE).map(PathBuf::from)) {
+    if let Some(folder) = given.map(Path::to_path_buf).or_else(|| std::env::var_os(PAGE_VARIABLE).map(PathBuf::from)) {
         return check(&folder);
     }
     let program = std::env::current_exe().and_then(|path| path.canonicalize()).unwrap_or_default();

@@ -29,7 +29,7 @@ impl Frame<'_> {
         let mut content = Vec::with_capacity(8 + 4 * (self.episodes.len() + geoms.len() + bodies.len()));
         content.extend(self.time.to_le_bytes());
         self.episodes.iter().for_each(|episode| content.extend(episode.to_le_bytes()));
-        [geoms, bodies].concat().iter().for_each(|number| content.extend(number.to_le_bytes()));
+        geoms.iter().chain(bodies).for_each(|number| content.extend(number.to_le_bytes()));
         message(FRAME, &content)
     }
 }

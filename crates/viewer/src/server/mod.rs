@@ -8,7 +8,7 @@ mod http;
 
 use channel::Channel;
 pub use error::ViewerError;
-pub use files::find_page;
+pub use files::{PAGE_VARIABLE, find_page};
 pub use frame::Frame;
 use serde_json::Value;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
@@ -88,7 +88,7 @@ impl Viewer {
         self.channel.ground((agent, field), frame::ground(agent, field, elevations));
     }
 
-    /// Shows the curve of a run: `{"total": steps, "steps": [..], "return_mean": [..], "speed_mean": [..], "text": ".."}`.
+    /// Shows the curve of a run: `{"total": steps, "steps": [..], "return_mean": [..], "speed_mean": [..]}`.
     pub fn curve(&self, curve: &Value) {
         self.channel.curve(frame::message(frame::CURVE, curve.to_string().as_bytes()));
     }
