@@ -68,6 +68,28 @@ const CASES: &[(&str, &[f64], usize)] = &[
         &[2.0],
         200,
     ),
+    // frames less than a millionth apart are the same: spun this fast or held this stiffly, the difference would show
+    (
+        r#"<mujoco model="an almost centered top"><option integrator="RK4"/><worldbody><body><freejoint/>
+        <inertial pos="9e-7 0 0" quat="1 9e-7 0 0" mass="1" diaginertia="1 2 2"/></body></worldbody></mujoco>"#,
+        &[0.0, 0.0, 0.0, 0.0, 0.0, 1000.0],
+        10,
+    ),
+    (
+        r#"<mujoco model="an almost centered ball"><option timestep="0.0001"/><worldbody>
+        <geom type="plane" size="1 1 1" pos="0 0 -0.1"/><body><joint type="slide" axis="0 0 1"/>
+        <geom size="0.1" pos="0 0 9e-7" solref="-1000000 -1"/></body></worldbody></mujoco>"#,
+        &[0.0],
+        100,
+    ),
+    (
+        r#"<mujoco model="a ball almost in its center of mass"><option timestep="0.0001"/><worldbody>
+        <geom type="plane" size="1 1 1" pos="0 0 0.1"/><body><joint type="slide" axis="0 0 1"/>
+        <inertial pos="0 0 0.2" quat="1 1 0 0" mass="1" diaginertia="1 1 1"/>
+        <geom size="0.1" pos="0 0 0.2000009" quat="1 1 0 0" solref="-1000000 -1"/></body></worldbody></mujoco>"#,
+        &[0.0],
+        100,
+    ),
     // no element uses the muscle, and the motor keeps its class's range
     (
         r#"<mujoco model="an unused muscle"><default><muscle ctrlrange="0 1" force="5" gear="3"/></default><worldbody><body>

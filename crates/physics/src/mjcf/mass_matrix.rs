@@ -8,6 +8,7 @@ use super::math::*;
 use super::room::Room;
 use super::tendon::moments;
 use crate::budget::OverBudget;
+use crate::model::same_frame::FRAME_EPS;
 use crate::model::{JointType, Model, Tendon, Vec3};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -29,7 +30,7 @@ impl Pose {
             let own = Frame { pos: b.pos, quat: b.quat };
             body.push(if i == 0 { own } else { body[b.parent].compose(&own) });
         }
-        let com = model.bodies.iter().zip(&body).map(|(b, frame)| frame.point(b.ipos)).collect();
+        let com = body.iter().enumerate().map(|(i, frame)| frame.point(model.inertial_frame(i).0)).collect();
         Pose { body, com }
     }
 
@@ -148,8 +149,6 @@ pub(crate) fn tendon_inverse_weights(model: &mut Model, mass: &MassMatrix) {
 ///
 /// MuJoCo does not look further up: on a static body that is deeper, or on one that is welded to it, the rule does not hold.
 fn is_lone_slider(model: &Model, index: usize, heavy: &HeavyTendons) -> bool {
-    /// Frames this close count as equal; MuJoCo's `kFrameEps`.
-    const FRAME_EPS: f64 = 1e-6;
     let body = &model.bodies[index];
     let parent = &model.bodies[body.parent];
     let small = |v: &[f64], eps: f64| v.iter().all(|x| x.abs() < eps);
@@ -353,7 +352,8 @@ impl SpatialInertia {
 fn spatial_inertia(model: &Model, pose: &Pose, b: usize, origin: Vec3) -> SpatialInertia {
     let body = &model.bodies[b];
     let r = sub(pose.com[b], origin);
-    let [xx, yy, zz, xy, xz, yz] = rotate_diagonal(mul_quat(pose.body[b].quat, body.iquat), body.inertia);
+    let [xx, yy, zz, xy, xz, yz] =
+        rotate_diagonal(mul_quat(pose.body[b].quat, model.inertial_frame(b).1), body.inertia);
     let mut second = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
     for (i, row) in second.iter_mut().enumerate() {
         for (j, entry) in row.iter_mut().enumerate() {

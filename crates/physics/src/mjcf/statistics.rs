@@ -15,11 +15,11 @@ pub(crate) fn compute(model: &mut Model, pose: &Pose, diagonal: &[f64], given: &
     for joint in 0..model.joints.len() {
         bounds.include(pose.anchor(model, joint), 0.0);
     }
-    for site in &model.sites {
-        bounds.include(pose.body[site.body].point(site.pos), 0.0);
+    for (i, site) in model.sites.iter().enumerate() {
+        bounds.include(pose.body[site.body].point(model.site_frame(i).0), 0.0);
     }
     let radii: Vec<f64> = model.geoms.iter().map(|g| bounding_radius(model, g)).collect();
-    for (geom, &radius) in model.geoms.iter().zip(&radii) {
+    for (i, (geom, &radius)) in model.geoms.iter().zip(&radii).enumerate() {
         // a plane counts with a tenth of the size that is drawn, an infinite one with a centimeter
         let drawn = geom.size[0].max(geom.size[1]);
         let radius = if radius > 0.0 {
@@ -29,7 +29,7 @@ pub(crate) fn compute(model: &mut Model, pose: &Pose, diagonal: &[f64], given: &
         } else {
             0.01
         };
-        bounds.include(pose.body[geom.body].point(geom.pos), radius);
+        bounds.include(pose.body[geom.body].point(model.geom_frame(i).0), radius);
     }
     let stat = &mut model.stat;
     stat.center = scale(add(bounds.low, bounds.high), 0.5);
@@ -47,8 +47,9 @@ pub(crate) fn compute(model: &mut Model, pose: &Pose, diagonal: &[f64], given: &
             length[b] = length[b].max(distance(pose.com[b], anchor));
         }
     }
-    for (geom, radius) in model.geoms.iter().zip(&radii).filter(|(g, r)| g.body > 0 && **r > 0.0) {
-        let center = pose.body[geom.body].point(geom.pos);
+    for (i, (geom, radius)) in model.geoms.iter().zip(&radii).enumerate().filter(|(_, (g, r))| g.body > 0 && **r > 0.0)
+    {
+        let center = pose.body[geom.body].point(model.geom_frame(i).0);
         length[geom.body] = length[geom.body].max(radius + distance(pose.com[geom.body], center));
     }
     let moving = model.bodies.len() - 1;

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 mod actuator;
 mod coupling;
 mod hull;
+pub(crate) mod same_frame;
 mod sensor;
 mod shape;
 pub(crate) mod vector;

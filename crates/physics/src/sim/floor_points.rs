@@ -45,14 +45,17 @@ pub(super) fn add<T: Real>(
     hard: &mut bool,
 ) -> bool {
     let (plane_geom, fixed, moving) = (fixed, &model.geoms[fixed], &model.geoms[geom]);
+    let placed = |geom: usize| {
+        let (mount, (pos, quat)) = (&mounts[model.geoms[geom].body], model.geom_frame(geom));
+        rigid::compose(&(mount.pos, mount.rot), &(pos, quat_to_rot(&quat)))
+    };
     let Some(link) = link else { return false };
     let pyramid = params.condim == 1 || (params.condim == 3 && model.opt.cone == Cone::Pyramidal);
     let shape = matches!(moving.kind, GeomType::Sphere | GeomType::Capsule | GeomType::Box);
     if fixed.kind != GeomType::Plane || mounts[fixed.body].body != 0 || !pyramid || !shape {
         return false;
     }
-    let mount = &mounts[fixed.body];
-    let plane = rigid::compose(&(mount.pos, mount.rot), &(fixed.pos, quat_to_rot(&fixed.quat)));
+    let plane = placed(plane_geom);
     if plane.1[2][2] < 1.0 - 1e-12 {
         return false;
     }
@@ -69,8 +72,7 @@ pub(super) fn add<T: Real>(
     *hard |= is_hard(model, mounts, [moving.body, fixed.body], diag);
     let soft = softness::<T>(model, &params.solref, &params.solimp, params.margin, diag);
 
-    let on_link = &mounts[moving.body];
-    let frame = rigid::compose(&(on_link.pos, on_link.rot), &(moving.pos, quat_to_rot(&moving.quat)));
+    let frame = placed(geom);
     let c3 = |v: [f64; 3]| [T::scalar(v[0]), T::scalar(v[1]), T::scalar(v[2])];
     let base = FloorPoint {
         link,

@@ -51,7 +51,7 @@ pub(super) fn gravity_compensation<T: Real>(
             }
             let w = body.mass * body.gravcomp;
             let m = &mounts[b];
-            let at = rotate(&m.rot, &body.ipos);
+            let at = rotate(&m.rot, &model.inertial_frame(b).0);
             weight += w;
             for i in 0..3 {
                 moment[i] += w * (at[i] + m.pos[i]);

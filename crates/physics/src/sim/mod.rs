@@ -112,7 +112,9 @@ impl<T: Real> Sim<T> {
         let flags = &model.opt.flags;
         let (link_of, mounts) = (link::number_links(model), weld::mounts(model));
         let (links, trees) = link::links::<T>(model, &mounts, &link_of);
-        let mount = |body: usize, pos: &[f64; 3], quat: &[f64; 4]| Mount::new::<T>(&mounts, &link_of, body, pos, quat);
+        let bodies = || 0..model.bodies.len();
+        let mount =
+            |body: usize, (pos, quat): ([f64; 3], [f64; 4])| Mount::new::<T>(&mounts, &link_of, body, &pos, &quat);
         let tendons = tendon::tendons::<T>(model);
         let equalities = equality::equalities::<T>(model, &mounts, &link_of, &tendons);
         let dof_link: Vec<usize> =
@@ -151,10 +153,10 @@ impl<T: Real> Sim<T> {
                 iterations: model.opt.ccd_iterations.min(MOST_ITERATIONS),
                 several: flags.multiccd,
             },
-            bodies: (0..model.bodies.len()).map(|b| mount(b, &[0.0; 3], &[1.0, 0.0, 0.0, 0.0])).collect(),
-            coms: model.bodies.iter().enumerate().map(|(b, x)| mount(b, &x.ipos, &x.iquat)).collect(),
-            geoms: model.geoms.iter().map(|g| mount(g.body, &g.pos, &g.quat)).collect(),
-            sites: model.sites.iter().map(|s| mount(s.body, &s.pos, &s.quat)).collect(),
+            bodies: bodies().map(|b| mount(b, ([0.0; 3], [1.0, 0.0, 0.0, 0.0]))).collect(),
+            coms: bodies().map(|b| mount(b, model.inertial_frame(b))).collect(),
+            geoms: model.geoms.iter().enumerate().map(|(i, g)| mount(g.body, model.geom_frame(i))).collect(),
+            sites: model.sites.iter().enumerate().map(|(i, s)| mount(s.body, model.site_frame(i))).collect(),
             dt: c(model.opt.timestep),
             gravity: gravity.map(c),
             rk4,

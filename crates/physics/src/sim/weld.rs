@@ -37,8 +37,8 @@ pub(crate) fn mounts(model: &Model) -> Vec<BodyMount> {
 fn spreads(model: &Model, mounts: &[BodyMount]) -> Vec<f64> {
     // mass, first moment, and trace of the inertia about the origin
     let mut sums = vec![(0.0, [0.0; 3], 0.0); mounts.len()];
-    for (m, b) in mounts.iter().zip(&model.bodies) {
-        let at = rotate(&m.rot, &b.ipos);
+    for (i, (m, b)) in mounts.iter().zip(&model.bodies).enumerate() {
+        let at = rotate(&m.rot, &model.inertial_frame(i).0);
         let (mass, moment, trace) = &mut sums[m.body];
         *mass += b.mass;
         *trace += b.inertia.iter().sum::<f64>();
@@ -69,8 +69,8 @@ pub(crate) fn lump(model: &Model, mounts: &[BodyMount], link: usize) -> Lump {
     let centers: Vec<Frame> = parts
         .iter()
         .map(|&b| {
-            let body = &model.bodies[b];
-            compose(&(mounts[b].pos, mounts[b].rot), &(body.ipos, quat_to_rot(&body.iquat)))
+            let (pos, quat) = model.inertial_frame(b);
+            compose(&(mounts[b].pos, mounts[b].rot), &(pos, quat_to_rot(&quat)))
         })
         .collect();
     let mut com = [0.0; 3];
