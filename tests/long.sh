@@ -6,13 +6,14 @@
 #   aarch64   the Python tests with the wheel for Arm, under qemu
 #   bits      states and weights with SSE2, under qemu with NEON, and with both WebAssembly modules
 #   web       the page in Chromium and Firefox, with five minutes of play
+#   soak      ten million steps of each agent
 #   crates    packs and compiles the published crates
 #   player    twenty random players in the game, and four with a camera in each of five worlds, ten minutes of its time each
 set -euo pipefail
 cd "$(dirname "$0")/.."
 parts=("$@")
 if [ $# = 0 ]; then
-  parts=(fuzz release aarch64 bits web crates player)
+  parts=(fuzz release aarch64 bits web soak crates player)
 fi
 for part in "${parts[@]}"; do
   echo "tests/long.sh: $part" >&2
@@ -35,11 +36,12 @@ for part in "${parts[@]}"; do
       crates/wasm/test.sh --both
       ;;
     web) web/test.sh --long ;;
+    soak) MARATHON_TEST_LONG=yes cargo test --release -p marathon-physics --test ten_million_steps_stay_finite -- --nocapture ;;
     crates) release/publish.sh --dry-run ;;
     player)
       cargo test --release --workspace --test a_stranger_plays -- --ignored --nocapture
       MARATHON_TEST_LONG=yes cargo test --release --workspace --test the_camera_stays_outside -- --nocapture
       ;;
-    *) echo "tests/long.sh: no part '$part'; there are fuzz, release, aarch64, bits, web, crates and player" >&2 && exit 2 ;;
+    *) echo "tests/long.sh: no part '$part'; there are fuzz, release, aarch64, bits, web, soak, crates and player" >&2 && exit 2 ;;
   esac
 done

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy.typing as npt
 
 from marathon_rl import _snapshots
 from marathon_rl._arrays import BoolArray, FloatArray, Streams
-from marathon_rl._native import CommandRange, Model
+from marathon_rl._native import CommandRange, Model, Viewer
 from marathon_rl.agents import MarathonAgent
 
 LARGEST = 1e6
@@ -480,6 +481,10 @@ class AgentVecEnv:
         if chosen.shape != (self.num_envs,):
             raise ValueError(f"mask has the shape {chosen.shape}, expected ({self.num_envs},)")
         return chosen
+
+    def show(self, *, port: int = 0, page: str | PathLike[str] | None = None) -> Viewer:
+        """Raise an error: the viewer takes tasks that Marathon has itself, no Python classes."""
+        raise NotImplementedError(f"{self._id} is a Python class; show takes the tasks of `marathon_rl.ids()`")
 
     def save(self) -> bytes:
         """Everything that the future depends on: NumPy's `.npz`, without pickles."""

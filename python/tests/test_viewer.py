@@ -10,6 +10,7 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
+from arm import Arm
 
 import marathon_rl
 
@@ -116,3 +117,11 @@ def test_errors(tmp_path):
     first.close()
     with pytest.raises(urllib.error.URLError):
         next(messages(first.url))
+
+
+def test_python_classes_cannot_be_shown():
+    """An agent that is a Python class says so."""
+    env = Arm.make().unwrapped
+    env.reset(seed=1)
+    with pytest.raises(NotImplementedError, match="Python class"):
+        env.show()
