@@ -158,7 +158,6 @@ fn what_is_not_supported_is_refused_by_name() {
         ("<geom type='sdf'/>", &["<geom> attribute 'type'", "signed distance fields are not supported"]),
         ("<geom size='1'><plugin/></geom>", &["plugins are not supported"]),
         ("<joint springyield='1'/>", &["attribute 'springyield'"]),
-        ("<replicate count='2'/>", &["<replicate>", "save the expanded model from MuJoCo"]),
         ("<composite/>", &["<composite>"]),
         ("<attach/>", &["<attach>"]),
         ("<flexcomp/>", &["<flexcomp>"]),
@@ -207,6 +206,27 @@ fn what_is_not_supported_is_refused_by_name() {
 }
 
 /// Settings that only matter together with others are refused where those are present.
+#[test]
+fn copies() {
+    let nested = "<replicate count='1000'>".repeat(4) + "<geom size='1'/>" + &"</replicate>".repeat(4);
+    for (content, parts) in [
+        ("<replicate offset='1 0 0'/>", &["<replicate>", "the attribute 'count' is missing"][..]),
+        ("<replicate count='-1'/>", &["<replicate>", "'count' is negative"]),
+        ("<replicate count='two'/>", &["attribute 'count'", "'two'"]),
+        ("<replicate count='2' ofset='1 0 0'/>", &["attribute 'ofset'", "'offset'"]),
+        ("<replicate count='2' offset='1 0'/>", &["attribute 'offset'"]),
+        ("<replicate count='2'><joint/></replicate>", &["<joint>", "put it into a <body>"]),
+        ("<replicate count='2'><geom size='1' sise='2'/></replicate>", &["attribute 'sise'", "'size'"]),
+        (&nested, &["<geom>", "the model asks for"]),
+    ] {
+        check(&in_body(content), &[&["bad.xml:5:"], parts].concat());
+    }
+    // what also refers to other things is not copied, and the name without a number is gone
+    let xml = "<mujoco><worldbody><replicate count='2'><body name='a'><geom size='1'/></body></replicate>
+        <body name='b'><geom size='1'/></body></worldbody><contact><exclude body1='a' body2='b'/></contact></mujoco>";
+    check(xml, &["there is no body 'a'", "'a0'"]);
+}
+
 #[test]
 fn what_is_not_supported_together() {
     let string = "<tendon><spatial name='t'><site site='s'/><site site='s'/></spatial></tendon>";

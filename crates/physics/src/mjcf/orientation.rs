@@ -5,7 +5,7 @@ use super::error::MjcfError;
 use super::math::*;
 use super::settings::Settings;
 use super::value::Attrs;
-use crate::model::Quat;
+use crate::model::{Quat, Vec3};
 
 const SPECIFIERS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes", "zaxis"];
 
@@ -40,18 +40,7 @@ fn read(element: &Element, specifier: &str, settings: &Settings) -> Result<Quat,
             let axis = unit([x, y, z]).ok_or_else(|| too_small("an axis"))?;
             Ok(from_axis_angle(axis, settings.angle(angle)))
         }
-        "euler" => {
-            let angles: [f64; 3] = plain.array_or(specifier, [0.0; 3])?;
-            let mut quat = IDENTITY;
-            for (turn, angle) in settings.eulerseq.iter().zip(angles) {
-                let mut axis = [0.0; 3];
-                axis[turn.axis] = 1.0;
-                let step = from_axis_angle(axis, settings.angle(angle));
-                // rotating axes multiply from the right, fixed axes from the left
-                quat = if turn.fixed { mul_quat(step, quat) } else { mul_quat(quat, step) };
-            }
-            Ok(normalized(quat))
-        }
+        "euler" => Ok(from_euler(plain.array_or(specifier, [0.0; 3])?, settings)),
         "xyaxes" => {
             let [a, b, c, d, e, f] = plain.array_or(specifier, [0.0; 6])?;
             let x = unit([a, b, c]).ok_or_else(|| too_small("an x axis"))?;
@@ -66,4 +55,17 @@ fn read(element: &Element, specifier: &str, settings: &Settings) -> Result<Quat,
             Ok(from_z_axis(z))
         }
     }
+}
+
+/// Rotation by three angles of the file, about the axes of `eulerseq`.
+pub(crate) fn from_euler(angles: Vec3, settings: &Settings) -> Quat {
+    let mut quat = IDENTITY;
+    for (turn, angle) in settings.eulerseq.iter().zip(angles) {
+        let mut axis = [0.0; 3];
+        axis[turn.axis] = 1.0;
+        let step = from_axis_angle(axis, settings.angle(angle));
+        // rotating axes multiply from the right, fixed axes from the left
+        quat = if turn.fixed { mul_quat(step, quat) } else { mul_quat(quat, step) };
+    }
+    normalized(quat)
 }

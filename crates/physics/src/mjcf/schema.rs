@@ -243,7 +243,7 @@ const BODY: &[Rule] = &[
     ),
     NO_PLUGIN,
     refused("attach", EXPAND),
-    refused("replicate", EXPAND),
+    REPLICATE,
     refused("composite", EXPAND),
     refused("flexcomp", NO_FLEX),
 ];
@@ -401,6 +401,14 @@ const CUSTOM: &[Rule] = &[
     rule("text", "name data", "", ""),
     section("tuple", "name", &[rule("element", "objname objtype prm", "", "")]),
 ];
+
+/// It is expanded before the rest of the model is checked.
+const REPLICATE: Rule = world_like(rule("replicate", "count offset euler sep childclass", "", ""));
+
+/// Checks the names of the attributes of a `<replicate>`.
+pub(crate) fn check_replicate(element: &Element) -> Result<(), MjcfError> {
+    attributes(element, &REPLICATE, "")
+}
 
 /// Checks the names of all elements and attributes.
 pub(crate) fn check(root: &Element) -> Result<(), MjcfError> {

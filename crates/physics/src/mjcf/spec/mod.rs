@@ -29,6 +29,7 @@
 //! * Names of attributes are checked at once, their values by [`ModelSpec::compile`], which also keeps to the
 //!   [budget](crate::budget).
 //! * Keyframes keep their meaning: the numbers of a joint, mocap body or actuator come and go with it.
+//! * `<replicate>` is expanded when the model is read: its copies are in `<frame>` elements.
 //! * [`ModelSpec::to_xml`] writes the model as MJCF. It compiles to the same bits.
 
 mod body_parts;
@@ -38,6 +39,7 @@ mod kind;
 mod model_parts;
 mod part;
 mod references;
+mod replicate;
 mod value;
 mod walk;
 mod write;
@@ -115,7 +117,9 @@ impl ModelSpec {
         name: &str,
         resolve: &dyn Fn(&str) -> Result<Vec<u8>, String>,
     ) -> Result<ModelSpec, MjcfError> {
-        let root = document::parse(xml, name, &|file| super::utf8(resolve(file)?), &Room::default())?;
+        let room = Room::default();
+        let mut root = document::parse(xml, name, &|file| super::utf8(resolve(file)?), &room)?;
+        replicate::expand(&mut root, &room)?;
         Ok(ModelSpec { root, folder: None }.with_world())
     }
 

@@ -1,7 +1,7 @@
 //! References between elements: attributes that hold the name of another element.
 
 use super::super::document::{Attr, Element};
-use super::kind::Kind;
+use super::kind::{Kind, WORLD};
 use super::walk::{self, Path};
 use std::collections::BTreeSet;
 
@@ -94,6 +94,44 @@ pub(super) fn leave_tuples(root: &mut Element, gone: &Gone) -> Vec<String> {
         }
     }
     labels
+}
+
+/// Whether an element refers to those names, and to nothing else but the world.
+pub(super) fn are_all_to(element: &Element, names: &Gone) -> bool {
+    let mut any = false;
+    all_to(element, names, &mut any) && any
+}
+
+fn all_to(element: &Element, names: &Gone, any: &mut bool) -> bool {
+    element.attrs.iter().all(|attr| {
+        let Some(kind) = target(element, attr) else { return true };
+        let hit = is_one_of(names, element, attr);
+        *any |= hit;
+        hit || (kind == Kind::Body && attr.value == WORLD)
+    }) && element.children.iter().all(|part| all_to(part, names, any))
+}
+
+fn is_one_of(names: &Gone, element: &Element, attr: &Attr) -> bool {
+    let known = |kind: Kind| names.contains(&(kind, attr.value.clone()));
+    target(element, attr).is_some_and(known) || (element.name == "touch" && attr.name == "site" && known(Kind::Geom))
+}
+
+/// A copy of an element. Its names, and its references to those names, end with `suffix`.
+pub(super) fn numbered(element: &Element, names: &Gone, suffix: &str) -> Element {
+    let mut copy = element.clone();
+    number(&mut copy, names, suffix);
+    copy
+}
+
+fn number(element: &mut Element, names: &Gone, suffix: &str) {
+    let renamed: Vec<usize> = (0..element.attrs.len())
+        .filter(|i| {
+            let attr = &element.attrs[*i];
+            (attr.name == "name" && !attr.value.is_empty()) || is_one_of(names, element, attr)
+        })
+        .collect();
+    renamed.into_iter().for_each(|i| element.attrs[i].value.push_str(suffix));
+    element.children.iter_mut().for_each(|part| number(part, names, suffix));
 }
 
 /// Changes all references to an element whose name changes.
