@@ -16,10 +16,8 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// Largest relative error of a step, and of trajectories of [`LONG`] steps.
-const BOUND: f64 = 1e-8;
+const BOUND: f64 = 5e-8;
 const LONG_BOUND: f64 = 1e-6;
-/// The same of a step if the first solver stops early: the second one amplifies the rounding of that iteration.
-const CAPPED_BOUND: f64 = 1e-5;
 const LONG: usize = 150;
 /// Steps of each trajectory from a random state, and their number per case.
 const STEPS: usize = 40;
@@ -34,7 +32,7 @@ const SLOPE: &str = r#"<worldbody>
   <body name="lid" pos="0.03 0 0.29" euler="0 15 0"><freejoint/><geom type="box" size="0.1 0.1 0.05"/></body>
 </worldbody>"#;
 
-/// Bodies of several geoms on a level floor, next to each other and on a block, with a declared pair.
+/// Bodies of several geoms on a level floor, next to each other and on a block. A declared pair is declared twice.
 const FLOOR: &str = r#"<worldbody>
   <geom name="floor" type="plane" size="20 20 1"/>
   <geom type="box" size="0.5 0.5 0.1" pos="0.6 0 0"/>
@@ -46,7 +44,8 @@ const FLOOR: &str = r#"<worldbody>
   </body>
   <body pos="-0.7 0 0.1"><freejoint/><geom name="ball" size="0.1"/></body>
 </worldbody>
-<contact><pair geom1="top" geom2="bar" condim="4" friction="0.6 0.5 0.02 0.001 0.001"/><pair geom1="ball" geom2="floor"/></contact>"#;
+<contact><pair geom1="top" geom2="bar" condim="4" friction="0.6 0.5 0.02 0.001 0.001"/><pair geom1="ball" geom2="floor"/>
+  <pair geom1="floor" geom2="top"/><pair geom1="top" geom2="bar" condim="3" friction="0.3 0.3 0.02 0.001 0.001"/></contact>"#;
 
 /// An arm with dry friction in its joints and a tendon, a limit, and an equality constraint. It pushes a crate.
 const ARM: &str = r#"<worldbody>
@@ -61,7 +60,7 @@ const ARM: &str = r#"<worldbody>
     </body>
   </body>
   <body pos="0.2 0.5 0.5"><joint name="d" axis="1 0 0" frictionloss="0.05"/><geom type="capsule" size="0.04" fromto="0 0 0 0.2 0 -0.2"/></body>
-  <body pos="0.8 0 0.1"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>
+  <body pos="0.83 0.02 0.1" euler="0 0 7"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>
 </worldbody>
 <tendon><fixed name="t" frictionloss="0.6"><joint joint="b" coef="1"/><joint joint="c" coef="-2"/></fixed></tendon>
 <equality><joint joint1="a" joint2="d" polycoef="0 0.5 0 0 0"/></equality>
@@ -103,10 +102,12 @@ struct State {
     settled: bool,
 }
 
-/// A model with the attributes `option` of its `<option>`.
+/// A model with the attributes `option` of its `<option>`. The first solver solves to the end, unless it has a low cap:
+/// then rounding would decide its line search.
 fn text(scene: &str, condim: usize, option: &str) -> String {
+    let exact = if option.contains(" iterations=") { "" } else { "tolerance='0' ls_tolerance='1e-10'" };
     format!(
-        r#"<mujoco model="no slip"><option tolerance="0" ls_tolerance="1e-10" {option}/>
+        r#"<mujoco model="no slip"><option {option} {exact}/>
         <default><geom condim="{condim}" friction="0.6 0.01 0.005" density="500"/></default>{scene}</mujoco>"#
     )
 }
@@ -175,7 +176,7 @@ fn label(text: &str) -> String {
     let scene = [(SLOPE, "slope"), (FLOOR, "floor"), (ARM, "arm"), (PLANAR, "planar"), (SHAPES, "shapes")];
     let scene = scene.iter().find(|(s, _)| text.contains(s)).map_or("", |(_, name)| name);
     let after = |tag: &str| text.split(tag).nth(1).and_then(|rest| rest.split("/>").next()).unwrap_or("").to_owned();
-    format!("{scene} {} {}", after("ls_tolerance=\"1e-10\" "), after("<geom ").split(" fric").next().unwrap_or(""))
+    format!("{scene} {} {}", after("<option "), after("<geom ").split(" fric").next().unwrap_or(""))
 }
 
 #[test]
@@ -192,7 +193,6 @@ fn steps_from_random_states_agree() {
     for (xml, answer) in cases.iter().zip(answers.as_array().expect("an answer per model")) {
         let sim = Sim::<f64>::new(&load(xml), SimOptions::default()).unwrap_or_else(|e| panic!("{e}"));
         let mut work = Work::new(&sim);
-        let bound = if sim.model().opt.iterations < 50 { CAPPED_BOUND } else { BOUND };
         let states: Vec<State> = serde_json::from_value(answer["states"].clone()).expect("states");
         let (mut own, mut differing): (BTreeMap<&str, f64>, usize) = (BTreeMap::new(), 0);
         for state in &states {
@@ -202,7 +202,7 @@ fn steps_from_random_states_agree() {
             }
             compared += 1;
             let errors = errors(&sim, &mut work, state);
-            differing += usize::from(errors.iter().any(|(_, e)| !(*e <= bound)));
+            differing += usize::from(errors.iter().any(|(_, e)| !(*e <= BOUND)));
             for (what, error) in errors {
                 let most = own.entry(what).or_default();
                 *most = largest([*most, error]);

@@ -183,7 +183,7 @@ fn floor<T: Real, S: Space>(sim: &Sim<T>, settings: &NoSlip, work: &Work<T>, sli
         carry::<T, S>(sim, work, slip, k);
     }
     let u = if sim.capped.is_some() { add3(&row.of_motion(&work.solver.link_acc[row.link]), &row.u0) } else { row.u };
-    let order = contact(settings.order(&sim.model, [row.plane, row.geom]));
+    let order = contact(settings.order(&sim.model, [row.plane, row.geom], sim.contacts.floor[row.candidate].declared));
     for lane in lanes_of::<T>(row.on) {
         let mu = [0, 1].map(|k| wide::<T>(&row.mu[k], lane));
         // the pyramid of a frictionless contact is flat
@@ -248,7 +248,7 @@ fn block<T: Real, S: Space>(sim: &Sim<T>, settings: &NoSlip, work: &Work<T>, sli
     }
     for lane in lanes_of::<T>(b.on) {
         let order = match b.source {
-            Source::Contacts => contact(settings.order(&sim.model, geoms(sim, b, lane))),
+            Source::Contacts => order(sim, settings, b, lane),
             _ => [TENDONS, i, 0, 0, 0, 0],
         };
         let mut p = patch(Place::Block(i), law, order, trees[lane], dim);
@@ -291,10 +291,12 @@ fn connect<T: Real>(sim: &Sim<T>, b: &Block<T>, lane: usize, rows: &mut SlipLane
     tree.unwrap_or(0)
 }
 
-/// The geoms of a contact in a lane.
-fn geoms<T: Real>(sim: &Sim<T>, b: &Block<T>, lane: usize) -> [usize; 2] {
+/// Key of a contact in a lane.
+fn order<T: Real>(sim: &Sim<T>, settings: &NoSlip, b: &Block<T>, lane: usize) -> [usize; 6] {
     let member = b.members.iter().find(|(_, lanes)| T::bits(*lanes) >> lane & 1 == 1);
-    member.map_or([0; 2], |(pair, _)| sim.contacts.pair(&sim.geoms, *pair).geoms)
+    let index = member.map_or(0, |(index, _)| *index);
+    let pair = sim.contacts.pair(&sim.geoms, index);
+    contact(settings.order(&sim.model, pair.geoms, pair.declared))
 }
 
 /// Key of a contact.
