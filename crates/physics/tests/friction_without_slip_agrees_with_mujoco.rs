@@ -9,7 +9,7 @@
 mod common;
 
 use common::numbers::{distance, largest, numbers};
-use marathon_physics::lanes::Isa;
+use marathon_physics::lanes::{Isa, Real};
 use marathon_physics::{Batch, BatchOptions, Group, Model, Readings, Sim, SimOptions, Work};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -152,22 +152,27 @@ fn load(text: &str) -> Model {
     Model::from_xml_str(text, "noslip.xml").unwrap_or_else(|e| panic!("{e}"))
 }
 
+fn widen<T: Real>(values: &[T]) -> Vec<f64> {
+    values.iter().map(|x| T::widen(x.get(0))).collect()
+}
+
 /// Errors of a state by quantity.
-fn errors(sim: &Sim<f64>, work: &mut Work<f64>, state: &State) -> [(&'static str, f64); 4] {
+fn errors<T: Real>(sim: &Sim<T>, work: &mut Work<T>, state: &State) -> [(&'static str, f64); 4] {
     let mut group = Group::new(sim);
     group.reset_lane(sim, 0, &state.qpos, &state.qvel);
-    group.ctrl.copy_from_slice(&state.ctrl);
-    group.qacc_warmstart.copy_from_slice(&state.warm);
+    for (to, from) in [(&mut group.ctrl, &state.ctrl), (&mut group.qacc_warmstart, &state.warm)] {
+        to.iter_mut().zip(from).for_each(|(to, from)| to.set(0, T::scalar(*from)));
+    }
     sim.forward(work, &group);
     let r = Readings::new(sim, &group, work);
-    let acc: Vec<f64> = (0..sim.model().nv).map(|d| r.qacc(d)).collect();
+    let acc: Vec<T> = (0..sim.model().nv).map(|d| r.qacc(d)).collect();
     let forces = r.constraint_forces();
     sim.step(work, &mut group, 1);
     [
-        ("acceleration", distance(&acc, &state.qacc, 1.0)),
-        ("constraint force", distance(&forces, &state.qfrc_constraint, 1.0)),
-        ("next position", distance(&group.qpos, &state.next_qpos, 1.0)),
-        ("next velocity", distance(&group.qvel, &state.next_qvel, 1.0)),
+        ("acceleration", distance(&widen(&acc), &state.qacc, 1.0)),
+        ("constraint force", distance(&widen(&forces), &state.qfrc_constraint, 1.0)),
+        ("next position", distance(&widen(&group.qpos), &state.next_qpos, 1.0)),
+        ("next velocity", distance(&widen(&group.qvel), &state.next_qvel, 1.0)),
     ]
 }
 
@@ -188,11 +193,12 @@ fn steps_from_random_states_agree() {
         .map(|(i, xml)| json!({"xml": xml, "seed": i, "trajectories": TRAJECTORIES, "steps": STEPS}))
         .collect();
     let answers = common::oracle("low_caps.py", &json!(jobs));
-    let (mut compared, mut unsettled, mut wrong) = (0, 0, Vec::new());
+    let (mut compared, mut unsettled, mut wrong, mut single_worst) = (0, 0, Vec::new(), Vec::new());
     let mut worst: BTreeMap<&str, f64> = BTreeMap::new();
     for (xml, answer) in cases.iter().zip(answers.as_array().expect("an answer per model")) {
         let sim = Sim::<f64>::new(&load(xml), SimOptions::default()).unwrap_or_else(|e| panic!("{e}"));
-        let mut work = Work::new(&sim);
+        let single = Sim::<f32>::new(sim.model(), SimOptions::default()).expect("as in double precision");
+        let (mut work, mut single_work) = (Work::new(&sim), Work::new(&single));
         let states: Vec<State> = serde_json::from_value(answer["states"].clone()).expect("states");
         let (mut own, mut differing): (BTreeMap<&str, f64>, usize) = (BTreeMap::new(), 0);
         for state in &states {
@@ -201,6 +207,7 @@ fn steps_from_random_states_agree() {
                 continue;
             }
             compared += 1;
+            single_worst.push(errors(&single, &mut single_work, state)[0].1);
             let errors = errors(&sim, &mut work, state);
             differing += usize::from(errors.iter().any(|(_, e)| !(*e <= BOUND)));
             for (what, error) in errors {
@@ -215,10 +222,19 @@ fn steps_from_random_states_agree() {
             wrong.push(format!("{} ({differing} of {}): {}", label(xml), states.len(), own.join(", ")));
         }
     }
-    println!("{compared} states compared, {unsettled} left out, worst {worst:?}");
+    single_worst.sort_by(f64::total_cmp);
+    let quantile = |q: f64| single_worst[(q * (single_worst.len() - 1) as f64) as usize];
+    println!(
+        "{compared} states compared, {unsettled} left out, worst {worst:?}; single precision: median {:.1e}, 90 % {:.1e}, \
+         99 % {:.1e}",
+        quantile(0.5),
+        quantile(0.9),
+        quantile(0.99)
+    );
     assert!(wrong.is_empty(), "{} of {} differ:\n{}", wrong.len(), cases.len(), wrong.join("\n"));
     let states = compared + unsettled;
     assert!(unsettled * 10 < states, "{unsettled} of {states} states depend on rounding");
+    assert!(quantile(0.9) < 1e-3, "single precision: {:.1e}", quantile(0.9));
 }
 
 /// Crates that stick, slide and turn on a slope.
