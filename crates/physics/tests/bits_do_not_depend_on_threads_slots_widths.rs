@@ -91,6 +91,10 @@ fn models() -> Vec<Model> {
     let without_slip = ["full/pile", "full/elliptic", "full/tendons", "capped/quadruped"].map(|n| {
         let mut model = load(&dir.join(format!("crates/physics/tests/models/{n}.xml")));
         model.opt.noslip_iterations = 3;
+        if n == "capped/quadruped" {
+            // with fewer, it becomes non-finite, in MuJoCo too
+            (model.opt.iterations, model.opt.ls_iterations) = (30, 50);
+        }
         model
     });
     agents.iter().chain(&others).map(load).chain(low).chain(without_slip).collect()
