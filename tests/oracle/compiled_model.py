@@ -18,7 +18,7 @@ CONES = ["Pyramidal", "Elliptic"]
 SOLVERS = ["Pgs", "Cg", "Newton"]
 FLAGS = [
     "constraint", "equality", "limit", "contact", "frictionloss", "spring", "damper", "gravity", "clampctrl", "warmstart",
-    "actuation", "refsafe", "eulerdamp", "filterparent", "multiccd", "island",
+    "actuation", "refsafe", "eulerdamp", "filterparent", "multiccd", "island", "midphase",
 ]
 SENSORS = {
     "TOUCH": "Touch", "ACCELEROMETER": "Accelerometer", "VELOCIMETER": "Velocimeter", "GYRO": "Gyro",
@@ -77,6 +77,7 @@ def options(m):
         "timestep": o.timestep, "gravity": o.gravity, "integrator": INTEGRATORS[int(o.integrator)],
         "cone": CONES[int(o.cone)], "impratio": o.impratio, "iterations": o.iterations,
         "ls_iterations": o.ls_iterations, "tolerance": o.tolerance, "ls_tolerance": o.ls_tolerance,
+        "noslip_iterations": o.noslip_iterations, "noslip_tolerance": o.noslip_tolerance,
         "ccd_iterations": o.ccd_iterations, "ccd_tolerance": o.ccd_tolerance,
         "solver": SOLVERS[int(o.solver)], "flags": {f: not disabled[f] for f in FLAGS},
         "density": o.density, "viscosity": o.viscosity, "wind": o.wind, "magnetic": o.magnetic,

@@ -84,7 +84,7 @@ fn edited_models() {
 #[test]
 fn dm_control_suite() {
     let folder = package("dm_control").join("suite");
-    // ball_in_cup has a string through sites, dog needs noslip iterations
+    // ball_in_cup has a string through sites
     let names = [
         "acrobot",
         "cartpole",

@@ -187,7 +187,6 @@ fn what_is_not_supported_is_refused_by_name() {
         ("<actuator><general joint='j' gainprm='1 2 3 4'/></actuator>", &["only the first three"]),
         ("<keyframe><key plastic='1'/></keyframe>", &["<key> attribute 'plastic'"]),
         ("<option actuatorgroupdisable='1'/>", &["<option> attribute 'actuatorgroupdisable'"]),
-        ("<option noslip_iterations='3'/>", &["<option> attribute 'noslip_iterations'"]),
         ("<option integrator='discrete'/>", &["'discrete' is not supported; use Euler or RK4"]),
         ("<option><flag speculative='enable'/></option>", &["<flag> attribute 'speculative'", "only 'disable'"]),
         ("<option><flag nativeccd='disable'/></option>", &["<flag> attribute 'nativeccd'", "only 'enable'"]),
@@ -362,7 +361,7 @@ fn settings_without_effect_are_accepted() {
         Model::from_xml_str(&in_body(content), "good.xml").unwrap();
     }
     for section in [
-        "<option density='0' solver='PGS' jacobian='sparse' wind='1 0 0' o_margin='1' noslip_iterations='0'/>",
+        "<option density='0' solver='PGS' jacobian='sparse' wind='1 0 0' o_margin='1' noslip_iterations='0' noslip_tolerance='0'/>",
         "<tendon><fixed><joint joint='j' coef='1'/></fixed></tendon><equality/><deformable/>",
         "<asset><mesh name='unused' file='a.stl'/><texture type='2d' builtin='checker'/></asset>",
         "<actuator><general joint='j' dyntype='none' actlimited='false' delay='0'/></actuator>",

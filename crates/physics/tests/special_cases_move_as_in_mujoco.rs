@@ -90,6 +90,16 @@ const CASES: &[(&str, &[f64], usize)] = &[
         &[0.0],
         100,
     ),
+    // each declaration is a contact of its own
+    (
+        r#"<mujoco model="pairs that are declared twice"><worldbody>
+        <geom name="floor" type="plane" size="1 1 1"/><geom name="wall" type="box" size="0.1 1 1" pos="0.22 0 0"/>
+        <body pos="0 0 0.12"><freejoint/><geom name="ball" size="0.1"/></body></worldbody>
+        <contact><pair geom1="ball" geom2="floor"/><pair geom1="floor" geom2="ball" condim="1" solref="0.01 1"/>
+        <pair geom1="wall" geom2="ball"/><pair geom1="ball" geom2="wall"/></contact></mujoco>"#,
+        &[0.5, 0.2, 0.0, 0.0, 0.0, 0.0],
+        200,
+    ),
     // no element uses the muscle, and the motor keeps its class's range
     (
         r#"<mujoco model="an unused muscle"><default><muscle ctrlrange="0 1" force="5" gear="3"/></default><worldbody><body>

@@ -150,6 +150,10 @@ fn touch_pair<T: Real>(
     let found: &[Touch<T>] = match pair.shapes {
         ShapePair::PlaneSphere => &[plane::plane_sphere(&ground, &sphere, margin)],
         ShapePair::PlaneCapsule => &plane::plane_capsule(&ground, &capsule(work, b, cb, size_b), margin),
+        // the second solver for friction needs MuJoCo's order of contacts
+        ShapePair::PlaneBox if sim.no_slip.is_some() => {
+            &plane::plane_box_in_order(&ground, &cuboid(work, mb, cb, size_b), margin)
+        }
         ShapePair::PlaneBox => &plane::plane_box(&ground, &cuboid(work, mb, cb, size_b), margin),
         ShapePair::PlaneCylinder => &plane::plane_cylinder(&ground, &cylinder(work, mb, cb, size_b), margin),
         ShapePair::PlaneEllipsoid => &[plane::plane_ellipsoid(&ground, &cuboid(work, mb, cb, size_b), margin)],

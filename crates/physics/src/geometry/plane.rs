@@ -62,6 +62,24 @@ fn axis_tangent<T: Real>(n: &V3<T>, axis: &V3<T>, slope: T) -> V3<T> {
 /// `i` is that of corners `i` and `7 - i`. Bit `k` of a corner's number is its side along axis `k`.
 #[inline(always)]
 pub(crate) fn plane_box<T: Real>(plane: &Plane<T>, b: &Cuboid<T>, margin: T) -> [Touch<T>; 4] {
+    box_corners(plane, b, margin).map(|(touch, _)| touch)
+}
+
+/// The same contacts in the order of the corners, as in MuJoCo: entry `k` is that of corner `k`.
+#[inline(always)]
+pub(crate) fn plane_box_in_order<T: Real>(plane: &Plane<T>, b: &Cuboid<T>, margin: T) -> [Touch<T>; 8] {
+    let corners = box_corners(plane, b, margin);
+    let mut out = [Touch::none(); 8];
+    for (i, (touch, opposite)) in corners.into_iter().enumerate() {
+        out[i] = Touch { on: T::and(touch.on, T::not(opposite)), ..touch };
+        out[7 - i] = Touch { on: T::and(touch.on, opposite), ..touch };
+    }
+    out
+}
+
+/// The lower of the opposite corners `i` and `7 - i`, and the lanes where it is the latter.
+#[inline(always)]
+fn box_corners<T: Real>(plane: &Plane<T>, b: &Cuboid<T>, margin: T) -> [(Touch<T>, T::Mask); 4] {
     let n = &plane.normal;
     let middle = height(plane, &b.center);
     let tangent = first_tangent(n);
@@ -76,7 +94,7 @@ pub(crate) fn plane_box<T: Real>(plane: &Plane<T>, b: &Cuboid<T>, margin: T) -> 
         ([-difference[0], -difference[1], -difference[2]], -rise_difference),
         (sum, rise_sum),
     ];
-    let mut out = [Touch::none(); 4];
+    let mut out = [(Touch::none(), T::none()); 4];
     for i in 0..4 {
         let (arm01, rise01) = offsets[i];
         let lift = rise01 - rise[2];
@@ -85,7 +103,7 @@ pub(crate) fn plane_box<T: Real>(plane: &Plane<T>, b: &Cuboid<T>, margin: T) -> 
         for k in 0..3 {
             corner[k] += negate_where::<T>(opposite, arm01[k] - arm[2][k]);
         }
-        out[i] = at(plane, &corner, middle - lift.abs(), margin, &tangent);
+        out[i] = (at(plane, &corner, middle - lift.abs(), margin, &tangent), opposite);
     }
     out
 }

@@ -84,16 +84,17 @@ const TOP: &[Rule] = &[
         rule(
             "option",
             "timestep gravity density viscosity wind magnetic integrator cone impratio iterations ls_iterations \
-             ls_tolerance tolerance ccd_iterations ccd_tolerance solver jacobian o_margin o_solref o_solimp o_friction",
+             ls_tolerance tolerance noslip_iterations noslip_tolerance ccd_iterations ccd_tolerance solver jacobian \
+             o_margin o_solref o_solimp o_friction",
             // each of these has an effect only together with something that is refused
-            "noslip_tolerance sdf_initpoints sdf_iterations sleep_tolerance",
-            "noslip_iterations=0 actuatorgroupdisable",
+            "sdf_initpoints sdf_iterations sleep_tolerance",
+            "actuatorgroupdisable",
         ),
         &[rule(
             "flag",
             "constraint equality limit contact frictionloss spring damper gravity clampctrl warmstart actuation \
-             refsafe eulerdamp filterparent island multiccd override",
-            "autoreset energy fwdinv invdiscrete midphase",
+             refsafe eulerdamp filterparent island midphase multiccd override",
+            "autoreset energy fwdinv invdiscrete",
             "sensor=enable nativeccd=enable sleep=disable diagexact=disable ipc=disable \
              speculative=disable",
         )],

@@ -141,6 +141,8 @@ pub(crate) fn options(root: &Element) -> Result<Options, MjcfError> {
         ls_iterations: 50,
         tolerance: 1e-8,
         ls_tolerance: 0.01,
+        noslip_iterations: 0,
+        noslip_tolerance: 1e-6,
         ccd_iterations: 35,
         ccd_tolerance: 1e-6,
         solver: Solver::Newton,
@@ -162,6 +164,7 @@ pub(crate) fn options(root: &Element) -> Result<Options, MjcfError> {
             filterparent: true,
             multiccd: true,
             island: true,
+            midphase: true,
         },
     };
     // the parameters of the override are read whether it is on or not
@@ -203,10 +206,13 @@ fn option(element: &Element, opt: &mut Options, given: &mut ContactOverride) -> 
     }
     opt.tolerance = at_least_zero("tolerance", attrs.number_or("tolerance", opt.tolerance)?)?;
     opt.ls_tolerance = at_least_zero("ls_tolerance", attrs.number_or("ls_tolerance", opt.ls_tolerance)?)?;
+    opt.noslip_tolerance =
+        at_least_zero("noslip_tolerance", attrs.number_or("noslip_tolerance", opt.noslip_tolerance)?)?;
     opt.ccd_tolerance = at_least_zero("ccd_tolerance", attrs.number_or("ccd_tolerance", opt.ccd_tolerance)?)?;
     let counts = [
         ("iterations", &mut opt.iterations),
         ("ls_iterations", &mut opt.ls_iterations),
+        ("noslip_iterations", &mut opt.noslip_iterations),
         ("ccd_iterations", &mut opt.ccd_iterations),
     ];
     for (name, value) in counts {
@@ -260,6 +266,7 @@ fn flags(element: &Element, flags: &mut Flags) -> Result<Option<bool>, MjcfError
             "filterparent" => Some(&mut flags.filterparent),
             "multiccd" => Some(&mut flags.multiccd),
             "island" => Some(&mut flags.island),
+            "midphase" => Some(&mut flags.midphase),
             _ => None,
         };
         let value = attrs.keyword(&attr.name, &[("disable", false), ("enable", true)])?;

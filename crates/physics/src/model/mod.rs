@@ -115,6 +115,10 @@ pub struct Options {
     pub tolerance: f64,
     /// Tolerance of the line search, as a fraction of the solver's.
     pub ls_tolerance: f64,
+    /// Sweeps of the second solver for friction (MuJoCo `noslip_iterations`); 0: none.
+    pub noslip_iterations: usize,
+    /// Scaled cost improvement below which the second solver ends.
+    pub noslip_tolerance: f64,
     /// Cap on the iterations that find the contacts of convex shapes.
     pub ccd_iterations: usize,
     /// Error of the depths of those contacts, m.
@@ -188,6 +192,9 @@ pub struct Flags {
     pub multiccd: bool,
     /// Whether trees that no constraint connects are solved separately.
     pub island: bool,
+    /// MuJoCo's middle phase of collision. It only decides the order of contacts, which the second solver for friction
+    /// depends on.
+    pub midphase: bool,
 }
 
 /// Integration method.

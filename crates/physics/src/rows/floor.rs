@@ -82,6 +82,12 @@ impl<T: Real> FloorRow<T> {
         self.total(&f)
     }
 
+    /// Forces along the edges at the current point.
+    #[inline(always)]
+    pub fn edge_forces(&self) -> [T; 4] {
+        self.edges(&self.u).map(|e| -(self.d * e.min(T::zero())))
+    }
+
     /// A force in the contact frame as a wrench about the reference point.
     #[inline(always)]
     pub fn wrench(&self, f: &V3<T>) -> V6<T> {

@@ -19,6 +19,16 @@ impl<T: Real> Block<T> {
         2 * (self.dim - 1)
     }
 
+    /// Forces along the edges of the pyramid at the current point; zero beyond their number.
+    #[inline(always)]
+    pub fn edge_forces(&self) -> [T; 10] {
+        let mut f = [T::zero(); 10];
+        for (e, f) in f.iter_mut().enumerate().take(self.edges()) {
+            *f = -(self.d[0] * self.edge(&self.u, e).min(T::zero()));
+        }
+        f
+    }
+
     /// Adds a force along an edge to row forces.
     #[inline(always)]
     fn add_edge(&self, f: &mut RowValues<T>, e: usize, x: T) {

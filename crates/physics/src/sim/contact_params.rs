@@ -9,6 +9,8 @@ const LEAST_FRICTION: f64 = 1e-5;
 
 /// Parameters of a contact between two geoms.
 pub(super) struct ContactParams {
+    /// Number of the declared pair, if it is one.
+    pub declared: Option<usize>,
     pub condim: usize,
     /// Two sliding, one torsional, two rolling coefficients.
     pub friction: [f64; 5],
@@ -19,10 +21,10 @@ pub(super) struct ContactParams {
 }
 
 impl ContactParams {
-    /// Contact parameters of the colliding geoms `i` and `j`, from their declaration if there is one.
-    pub fn of(model: &Model, i: usize, j: usize, declared: Option<&Pair>) -> Self {
+    /// Contact parameters of the colliding geoms `i` and `j`, from the declared pair with that number if there is one.
+    pub fn of(model: &Model, i: usize, j: usize, declared: Option<usize>) -> Self {
         let mut params = match declared {
-            Some(pair) => ContactParams::declared(pair),
+            Some(number) => ContactParams { declared, ..ContactParams::declared(&model.pairs[number]) },
             None => ContactParams::combine(&model.geoms[i], &model.geoms[j]),
         };
         if let Some(all) = &model.opt.contact_override {
@@ -41,7 +43,14 @@ impl ContactParams {
         if a.priority != b.priority {
             let g = if a.priority > b.priority { a } else { b };
             let friction = spread(&g.friction);
-            return ContactParams { condim: g.condim, friction, solref: g.solref, solimp: g.solimp, margin };
+            return ContactParams {
+                declared: None,
+                condim: g.condim,
+                friction,
+                solref: g.solref,
+                solimp: g.solimp,
+                margin,
+            };
         }
         const TINY: f64 = 1e-15;
         let mix = match (a.solmix >= TINY, b.solmix >= TINY) {
@@ -65,11 +74,19 @@ impl ContactParams {
         for i in 0..3 {
             friction[i] = a.friction[i].max(b.friction[i]);
         }
-        ContactParams { condim: a.condim.max(b.condim), friction: spread(&friction), solref, solimp, margin }
+        ContactParams {
+            declared: None,
+            condim: a.condim.max(b.condim),
+            friction: spread(&friction),
+            solref,
+            solimp,
+            margin,
+        }
     }
 
     fn declared(pair: &Pair) -> Self {
         ContactParams {
+            declared: None,
             condim: pair.condim,
             friction: pair.friction,
             solref: pair.solref,
@@ -84,13 +101,13 @@ fn spread(f: &[f64; 3]) -> [f64; 5] {
     [f[0], f[0], f[1], f[2], f[2]]
 }
 
-/// The declared pairs by their geoms, the lower number first. Filters do not apply to them. If a pair is declared
-/// twice, the first declaration counts.
-pub(super) fn declared(model: &Model) -> BTreeMap<[usize; 2], &Pair> {
-    let mut pairs = BTreeMap::new();
-    for pair in &model.pairs {
+/// The numbers of the declared pairs by their geoms, the lower number first. Filters do not apply to them. A pair that is
+/// declared twice touches twice.
+pub(super) fn declared(model: &Model) -> BTreeMap<[usize; 2], Vec<usize>> {
+    let mut pairs: BTreeMap<[usize; 2], Vec<usize>> = BTreeMap::new();
+    for (number, pair) in model.pairs.iter().enumerate() {
         let [i, j] = pair.geoms;
-        pairs.entry([i.min(j), i.max(j)]).or_insert(pair);
+        pairs.entry([i.min(j), i.max(j)]).or_default().push(number);
     }
     pairs
 }

@@ -103,7 +103,7 @@ pub(super) fn contacts<T: Real>(
     }
     for (at, i) in able.iter().copied().enumerate() {
         for j in able[at + 1..].iter().copied() {
-            let declared = declared.get(&[i, j]).copied();
+            let declared = declared.get(&[i, j]);
             if declared.is_none() && !may_collide(model, mounts, &excluded, i, j) {
                 continue;
             }
@@ -122,21 +122,24 @@ pub(super) fn contacts<T: Real>(
                 out.pairs.push(GeomPair { geoms, spec: *spec });
                 continue;
             }
-            let params = ContactParams::of(model, i, j, declared);
-            if floor_points::add::<T>(model, mounts, (a, b), link(b), &params, &mut out.floor, &mut out.hard) {
-                continue;
-            }
-            if !pairs::add::<T>(model, mounts, [a, b], [link(a), link(b)], &params, &mut out.specs, &mut out.hard) {
-                let (ka, kb) = (model.geoms[a].kind, model.geoms[b].kind);
-                return refuse(
-                    format!("contact of the {ka:?} {} with the {kb:?} {}", label(model, a), label(model, b)),
-                    "fix planes and height fields to the world, or turn the contact off with contype and conaffinity",
-                );
-            }
-            let spec = out.specs.len() as u32 - 1;
-            out.pairs.push(GeomPair { geoms, spec });
-            if declared.is_none() {
-                known.insert([kinds[a], kinds[b]], spec);
+            let declarations = declared.map_or(vec![None], |numbers| numbers.iter().copied().map(Some).collect());
+            for number in declarations {
+                let params = ContactParams::of(model, i, j, number);
+                if floor_points::add::<T>(model, mounts, (a, b), link(b), &params, &mut out.floor, &mut out.hard) {
+                    continue;
+                }
+                if !pairs::add::<T>(model, mounts, [a, b], [link(a), link(b)], &params, &mut out.specs, &mut out.hard) {
+                    let (ka, kb) = (model.geoms[a].kind, model.geoms[b].kind);
+                    return refuse(
+                        format!("contact of the {ka:?} {} with the {kb:?} {}", label(model, a), label(model, b)),
+                        "fix planes and height fields to the world, or turn the contact off with contype and conaffinity",
+                    );
+                }
+                let spec = out.specs.len() as u32 - 1;
+                out.pairs.push(GeomPair { geoms, spec });
+                if number.is_none() {
+                    known.insert([kinds[a], kinds[b]], spec);
+                }
             }
         }
     }

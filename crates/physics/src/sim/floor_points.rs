@@ -19,6 +19,8 @@ pub(crate) struct FloorPoint<C> {
     pub geom: usize,
     /// Geom of the plane.
     pub plane: usize,
+    /// Number of the declared pair, if it is one.
+    pub declared: Option<usize>,
     /// Center of the touching sphere (radius 0 for a box corner), in the link's frame.
     pub point: [C; 3],
     pub radius: C,
@@ -78,6 +80,7 @@ pub(super) fn add<T: Real>(
         link,
         geom,
         plane: plane_geom,
+        declared: params.declared,
         point: c3(frame.0),
         radius: T::scalar(moving.size[0]),
         axis: None,

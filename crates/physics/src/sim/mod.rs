@@ -15,6 +15,7 @@ mod floor_points;
 mod limit;
 mod link;
 mod medium;
+mod no_slip;
 mod options;
 mod pairs;
 mod softness;
@@ -31,6 +32,7 @@ pub(crate) use equality::{EqualitySpec, Frames, Length, Tie};
 pub(crate) use limit::{BallLimit, DryFriction, LimitSpec};
 pub(crate) use link::{Link, LinkJoint, Mount};
 pub(crate) use medium::{Drag, GravComp};
+pub(crate) use no_slip::NoSlip;
 pub(crate) use options::MOST_COUPLED_ROWS;
 pub use options::{SimError, SimOptions};
 pub(crate) use pairs::{Cull, GeomPair, GeomPairOf, PairSpec, ShapePair};
@@ -91,6 +93,8 @@ pub struct Sim<T: Real> {
     pub(crate) warmstart: bool,
     /// Solver settings of models whose iteration cap stops the solver before it converges.
     pub(crate) capped: Option<Caps>,
+    /// Settings of the second solver for friction, of models that have it.
+    pub(crate) no_slip: Option<NoSlip>,
     pub(crate) max_newton: usize,
     /// Number of rows between moving bodies above which an agent is factorized separately.
     pub(crate) most_rows: usize,
@@ -164,6 +168,7 @@ impl<T: Real> Sim<T> {
             elliptic: model.opt.cone == Cone::Elliptic,
             warmstart: flags.warmstart,
             capped: Caps::new(model, &options),
+            no_slip: NoSlip::new(model),
             max_newton: caps::cap(model, &options),
             most_rows: options.most_coupled_rows.unwrap_or(MOST_COUPLED_ROWS),
             max_line_search: model.opt.ls_iterations,

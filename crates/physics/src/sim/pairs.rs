@@ -99,6 +99,8 @@ pub(crate) struct GeomPairOf<'a, C> {
 pub(crate) struct PairSpec<C> {
     /// Whether both geoms move.
     pub coupled: bool,
+    /// Number of the declared pair, if it is one.
+    pub declared: Option<usize>,
     /// In MJCF's order. Unused sizes are zero: a sphere is a capsule without length.
     pub sizes: [[C; 3]; 2],
     pub shapes: ShapePair,
@@ -198,6 +200,7 @@ pub(super) fn add<T: Real>(
     *hard |= is_hard(model, mounts, [a.body, b.body], diag);
     specs.push(PairSpec {
         coupled: links[0].is_some() && links[1].is_some(),
+        declared: params.declared,
         sizes: [sizes(a).map(c), sizes(b).map(c)],
         shapes,
         kinds: [a.kind, b.kind],

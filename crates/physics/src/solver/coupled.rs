@@ -131,7 +131,7 @@ kernel_fn! {
 }
 
 /// Marks the links whose joints a block can move, up to the roots.
-fn mark_path<T: Real>(sim: &Sim<T>, block: &Block<T>, on_path: &mut [bool]) {
+pub(super) fn mark_path<T: Real>(sim: &Sim<T>, block: &Block<T>, on_path: &mut [bool]) {
     on_path.fill(false);
     match &block.jacobian {
         Jacobian::Points { sides, .. } => {
@@ -145,6 +145,11 @@ fn mark_path<T: Real>(sim: &Sim<T>, block: &Block<T>, on_path: &mut [bool]) {
             }
         }
     }
+    mark_up(sim, on_path);
+}
+
+/// Marks the links below marked ones, down to the roots.
+pub(super) fn mark_up<T: Real>(sim: &Sim<T>, on_path: &mut [bool]) {
     for l in (0..sim.links.len()).rev() {
         if let (true, Some(p)) = (on_path[l], sim.links[l].parent) {
             on_path[p] = true;
@@ -163,15 +168,26 @@ fn inward<T: Real, S: Space>(
     on_path: &[bool],
     out: &mut [T],
 ) {
+    clear(sim, rhs, link_force, on_path);
+    exert(&work.rows.blocks[b], k, rhs, link_force);
+    carry_inward::<T, S>(sim, work, (rhs, link_force), on_path, out);
+}
+
+/// Removes all forces from the joints and from the links on the path.
+#[inline(always)]
+pub(super) fn clear<T: Real>(sim: &Sim<T>, rhs: &mut [T], link_force: &mut [V6<T>], on_path: &[bool]) {
     let z = T::zero();
     rhs.fill(z);
-    out.fill(z);
     for l in 0..sim.links.len() {
         if on_path[l] {
             link_force[l] = [z; 6];
         }
     }
-    let block = &work.rows.blocks[b];
+}
+
+/// Adds a unit force along row `k` of a block.
+#[inline(always)]
+pub(super) fn exert<T: Real>(block: &Block<T>, k: usize, rhs: &mut [T], link_force: &mut [V6<T>]) {
     match &block.jacobian {
         Jacobian::Points { sides, .. } => {
             for (s, side) in sides.iter().enumerate() {
@@ -191,6 +207,18 @@ fn inward<T: Real, S: Space>(
             }
         }
     }
+}
+
+/// Inward pass of forces on joints and links, along the path.
+#[inline(always)]
+pub(super) fn carry_inward<T: Real, S: Space>(
+    sim: &Sim<T>,
+    work: &Work<T>,
+    (rhs, link_force): (&[T], &mut [V6<T>]),
+    on_path: &[bool],
+    out: &mut [T],
+) {
+    out.fill(T::zero());
     for l in (0..sim.links.len()).rev() {
         if !on_path[l] {
             continue;

@@ -27,7 +27,9 @@ mod capped;
 mod coupled;
 mod crowd;
 mod newton;
+mod noslip;
 mod search;
 
 pub(crate) use capped::solve as solve_capped;
 pub(crate) use newton::{apply_forces, solve};
+pub(crate) use noslip::prevent_slip;

@@ -6,7 +6,7 @@ use crate::constraint::{equality_blocks, joint_rows, tendon_blocks};
 use crate::dynamics::*;
 use crate::lanes::{Real, kernel_fn};
 use crate::sim::Sim;
-use crate::solver::{solve, solve_capped};
+use crate::solver::{prevent_slip, solve, solve_capped};
 use crate::state::{Group, Work};
 
 /// Frames, axes, inertias.
@@ -157,6 +157,9 @@ impl<T: Real> Sim<T> {
             (true, false) => planar_fwd_constraint(self, group, work),
             (false, true) => capped_fwd_constraint(self, group, work),
             (true, true) => planar_capped_fwd_constraint(self, group, work),
+        }
+        if self.no_slip.is_some() {
+            prevent_slip(self, work);
         }
     }
 

@@ -21,6 +21,7 @@ mod stages;
 
 use super::{blocks, crowd, newton};
 use crate::algebra::planar::Space;
+use crate::algebra::spatial::Inertia;
 use crate::dynamics::{accelerate, factorize, link_accelerations};
 use crate::lanes::Real;
 use crate::sim::{Caps, Sim};
@@ -159,24 +160,36 @@ fn scales<T: Real, S: Space>(sim: &Sim<T>, caps: &Caps, work: &Work<T>, c: &mut 
     for sums in c.sums.iter_mut() {
         *sums = [T::zero(); 3];
     }
-    c.composite.copy_from_slice(&work.motion.inertia);
-    for (l, link) in sim.links.iter().enumerate().rev() {
-        for d in link.dofs.clone() {
-            let axis = &work.dofs[d].axis;
-            let diagonal = S::dot(axis, &S::momentum(&c.composite[l], axis)) + T::splat(sim.armature[d]);
-            c.sums[link.tree][0] += diagonal;
-        }
-        if let Some(p) = link.parent {
-            for i in 0..10 {
-                let x = c.composite[l][i];
-                c.composite[p][i] += x;
-            }
-        }
-    }
+    let sums = &mut c.sums;
+    for_each_diagonal::<T, S>(sim, work, &mut c.composite, |tree, x| sums[tree][0] += x);
     islands::gather(&c.island, &mut c.sums);
     for tree in 0..sim.trees {
         for lane in 0..T::LANES {
             c.scale[tree * T::LANES + lane] = 1.0 / T::widen(c.sums[tree][0].get(lane));
+        }
+    }
+}
+
+/// Calls `visit` with the tree and the value of every number on the diagonal of the mass matrix. `composite` is memory
+/// for one inertia per link.
+#[inline(always)]
+pub(super) fn for_each_diagonal<T: Real, S: Space>(
+    sim: &Sim<T>,
+    work: &Work<T>,
+    composite: &mut [Inertia<T>],
+    mut visit: impl FnMut(usize, T),
+) {
+    composite.copy_from_slice(&work.motion.inertia);
+    for (l, link) in sim.links.iter().enumerate().rev() {
+        for d in link.dofs.clone() {
+            let axis = &work.dofs[d].axis;
+            visit(link.tree, S::dot(axis, &S::momentum(&composite[l], axis)) + T::splat(sim.armature[d]));
+        }
+        if let Some(p) = link.parent {
+            for i in 0..10 {
+                let x = composite[l][i];
+                composite[p][i] += x;
+            }
         }
     }
 }

@@ -7,6 +7,7 @@ mod forces;
 mod motion;
 mod readings;
 mod rk4;
+mod slip;
 mod solver;
 
 pub(crate) use capped::Capped;
@@ -16,6 +17,7 @@ pub(crate) use forces::Forces;
 pub(crate) use motion::Motion;
 pub(crate) use readings::Measured;
 pub(crate) use rk4::Rk4;
+pub(crate) use slip::{Law, MOST_ROWS, Patch, Place, Slip, SlipLane};
 pub(crate) use solver::Solver;
 
 use super::stats::SolverStats;

@@ -4,8 +4,8 @@ use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::multifrontal::Crowd;
 use crate::sim::Sim;
-use crate::state::Capped;
 use crate::state::coupling::Coupling;
+use crate::state::{Capped, Slip};
 
 /// Memory of the constraint solver and of the recursion that it runs.
 #[derive(Clone, Debug)]
@@ -31,6 +31,7 @@ pub(crate) struct Solver<T: Real> {
     pub link_force: Vec<V6<T>>,
     pub coupling: Coupling<T>,
     pub capped: Capped<T>,
+    pub slip: Slip<T>,
     /// Per lane, once it has had a crowd: its factorization.
     pub crowds: Vec<Crowd<T::Scalar>>,
     /// Lanes that use it in the current step.
@@ -55,6 +56,7 @@ impl<T: Real> Solver<T> {
             link_force: vec![[z; 6]; nl],
             coupling: Coupling::new(nl, nv),
             capped: Capped::new(sim),
+            slip: Slip::new(sim),
             crowds: Vec::new(),
             crowded: T::none(),
         }
