@@ -6,7 +6,7 @@
 use super::factor::Factor;
 use super::math::*;
 use super::room::Room;
-use super::tendon::moments;
+use super::tendon::Moments;
 use crate::budget::OverBudget;
 use crate::model::same_frame::FRAME_EPS;
 use crate::model::{JointType, Model, Tendon, Vec3};
@@ -29,6 +29,30 @@ impl Pose {
         for (i, b) in model.bodies.iter().enumerate() {
             let own = Frame { pos: b.pos, quat: b.quat };
             body.push(if i == 0 { own } else { body[b.parent].compose(&own) });
+        }
+        let com = body.iter().enumerate().map(|(i, frame)| frame.point(model.inertial_frame(i).0)).collect();
+        Pose { body, com }
+    }
+
+    /// World poses in another configuration of the hinges and slides.
+    pub fn at(model: &Model, qpos: &[f64]) -> Self {
+        let mut body: Vec<Frame> = Vec::with_capacity(model.bodies.len());
+        for (i, b) in model.bodies.iter().enumerate() {
+            let own = Frame { pos: b.pos, quat: b.quat };
+            let mut frame = if i == 0 { own } else { body[b.parent].compose(&own) };
+            for joint in &model.joints[b.joint_start..b.joint_start + b.joint_count] {
+                let away = qpos[joint.qpos_adr] - model.qpos0[joint.qpos_adr];
+                match joint.kind {
+                    JointType::Slide => frame.pos = add(frame.pos, scale(rotate(frame.quat, joint.axis), away)),
+                    JointType::Hinge => {
+                        let anchor = frame.point(joint.pos);
+                        frame.quat = normalized(mul_quat(frame.quat, from_axis_angle(joint.axis, away)));
+                        frame.pos = sub(anchor, rotate(frame.quat, joint.pos));
+                    }
+                    JointType::Ball | JointType::Free => {}
+                }
+            }
+            body.push(frame);
         }
         let com = body.iter().enumerate().map(|(i, frame)| frame.point(model.inertial_frame(i).0)).collect();
         Pose { body, com }
@@ -100,10 +124,11 @@ pub(crate) fn inverse_weights(
     model: &mut Model,
     pose: &Pose,
     simple: &[bool],
+    moments: &Moments,
     room: &Room,
 ) -> Result<MassMatrix, MassMatrixError> {
     let mut mass_matrix = MassMatrix { diagonal: vec![0.0; model.nv], blocks: Vec::new() };
-    let heavy = HeavyTendons::new(model);
+    let heavy = HeavyTendons::new(model, moments);
     let mut first = 0;
     while first < model.nv {
         let root = model.bodies[model.dofs[first].body].root_id;
@@ -139,9 +164,9 @@ pub(crate) fn inverse_weights(
 }
 
 /// Sets the inverse weights of tendons.
-pub(crate) fn tendon_inverse_weights(model: &mut Model, mass: &MassMatrix) {
-    for i in 0..model.tendons.len() {
-        model.tendons[i].invweight0 = mass.inverse_form(&moments(model, &model.tendons[i]));
+pub(crate) fn tendon_inverse_weights(model: &mut Model, mass: &MassMatrix, moments: &Moments) {
+    for (tendon, arms) in model.tendons.iter_mut().zip(moments) {
+        tendon.invweight0 = mass.inverse_form(arms);
     }
 }
 
@@ -155,7 +180,7 @@ fn is_lone_slider(model: &Model, index: usize, heavy: &HeavyTendons) -> bool {
     let aligned = |axis: Vec3| axis.iter().filter(|x| x.abs() > EPS).count() == 1;
     let joints = &model.joints[body.joint_start..body.joint_start + body.joint_count];
     !joints.is_empty()
-        && !joints.iter().any(|j| heavy.0.contains_key(&j.dof_adr))
+        && !joints.iter().any(|j| heavy.by_dof.contains_key(&j.dof_adr))
         && joints.iter().all(|j| j.kind == JointType::Slide && small(&j.pos, FRAME_EPS) && aligned(j.axis))
         && small(&body.ipos, FRAME_EPS)
         && small(&body.iquat[1..], FRAME_EPS)
@@ -164,22 +189,25 @@ fn is_lone_slider(model: &Model, index: usize, heavy: &HeavyTendons) -> bool {
 }
 
 /// Tendons with inertia, by the dofs that they pull.
-struct HeavyTendons(BTreeMap<usize, Vec<usize>>);
+struct HeavyTendons<'a> {
+    by_dof: BTreeMap<usize, Vec<usize>>,
+    moments: &'a Moments,
+}
 
-impl HeavyTendons {
-    fn new(model: &Model) -> Self {
+impl<'a> HeavyTendons<'a> {
+    fn new(model: &Model, moments: &'a Moments) -> Self {
         let mut by_dof: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-        for (i, tendon) in model.tendons.iter().enumerate().filter(|(_, t)| t.armature != 0.0) {
-            for (dof, _) in moments(model, tendon) {
-                by_dof.entry(dof).or_default().push(i);
+        for (i, _) in model.tendons.iter().enumerate().filter(|(_, t)| t.armature != 0.0) {
+            for (dof, _) in &moments[i] {
+                by_dof.entry(*dof).or_default().push(i);
             }
         }
-        HeavyTendons(by_dof)
+        HeavyTendons { by_dof, moments }
     }
 
     /// Tendons that pull any of these dofs, in the model's order.
     fn of(&self, dofs: std::ops::Range<usize>) -> BTreeSet<usize> {
-        self.0.range(dofs).flat_map(|(_, tendons)| tendons.iter().copied()).collect()
+        self.by_dof.range(dofs).flat_map(|(_, tendons)| tendons.iter().copied()).collect()
     }
 }
 
@@ -193,9 +221,9 @@ struct SpatialInertia {
 
 /// Motion axis of one dof: angular velocity, and linear velocity at the tree's reference point.
 #[derive(Clone, Copy)]
-struct Motion {
+pub(crate) struct Motion {
     angular: Vec3,
-    linear: Vec3,
+    pub linear: Vec3,
 }
 
 impl Motion {
@@ -250,18 +278,18 @@ impl Tree {
             mass[i * n + i] += model.dofs[self.first + i].armature;
         }
         for tendon in heavy.of(self.first..self.first + n) {
-            self.add_armature(model, &model.tendons[tendon], &mut mass);
+            self.add_armature(model, &model.tendons[tendon], &heavy.moments[tendon], &mut mass);
         }
         mass
     }
 
     /// Adds the inertia of a tendon. As in MuJoCo it couples only dofs of which one is an ancestor of the other: the
     /// mass matrix has no other entries.
-    fn add_armature(&self, model: &Model, tendon: &Tendon, mass: &mut [f64]) {
+    fn add_armature(&self, model: &Model, tendon: &Tendon, moments: &[(usize, f64)], mass: &mut [f64]) {
         let n = self.motions.len();
         let own = self.first..self.first + n;
         // a tendon names a joint once
-        let arms: Vec<(usize, f64)> = moments(model, tendon).into_iter().filter(|(dof, _)| own.contains(dof)).collect();
+        let arms: Vec<(usize, f64)> = moments.iter().copied().filter(|(dof, _)| own.contains(dof)).collect();
         let by_dof: BTreeMap<usize, f64> = arms.iter().copied().collect();
         for (i, at_i) in &arms {
             let mut ancestor = Some(*i);
@@ -364,7 +392,7 @@ fn spatial_inertia(model: &Model, pose: &Pose, b: usize, origin: Vec3) -> Spatia
 }
 
 /// Free joints: three world axes, then the body's axes. Ball joints: the body's axes. Others: the joint's axis.
-fn motion(model: &Model, pose: &Pose, dof: usize, origin: Vec3) -> Motion {
+pub(crate) fn motion(model: &Model, pose: &Pose, dof: usize, origin: Vec3) -> Motion {
     let joint_index = model.dofs[dof].joint;
     let joint = &model.joints[joint_index];
     let k = dof - joint.dof_adr;

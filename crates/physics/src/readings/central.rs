@@ -251,9 +251,8 @@ impl<T: Real> Kernel<T> for Actuation<'_, T> {
                 }
                 TransmissionSpec::Tendon { index, gear } => {
                     let pull = *force * T::splat(*gear);
-                    for term in &sim.tendons[*index].terms {
-                        work.readings.qfrc_actuator[term.dof] =
-                            pull.mul_add(T::splat(term.coef), work.readings.qfrc_actuator[term.dof]);
+                    for (dof, arm) in sim.tendons[*index].arms(&work.forces.tendon_moments) {
+                        work.readings.qfrc_actuator[dof] = pull.mul_add(arm, work.readings.qfrc_actuator[dof]);
                     }
                 }
             }

@@ -15,9 +15,12 @@ pub(super) struct LimitReading<T> {
 }
 
 impl<T: Real> Readings<'_, T> {
-    /// Length of a fixed tendon.
+    /// Length of a tendon.
     #[inline(always)]
     pub(super) fn tendon_length(&self, tendon: usize) -> T {
+        if self.sim.tendons[tendon].spatial {
+            return self.work.strings.length[tendon];
+        }
         let mut sum = T::zero();
         if let TendonKind::Fixed(terms) = &self.sim.model.tendons[tendon].kind {
             for (joint, coef) in terms {
@@ -27,9 +30,12 @@ impl<T: Real> Readings<'_, T> {
         sum
     }
 
-    /// Rate of change of a fixed tendon's length.
+    /// Rate of change of a tendon's length.
     #[inline(always)]
     pub(super) fn tendon_velocity(&self, tendon: usize) -> T {
+        if self.sim.tendons[tendon].spatial {
+            return self.work.strings.velocity[tendon];
+        }
         let mut sum = T::zero();
         if let TendonKind::Fixed(terms) = &self.sim.model.tendons[tendon].kind {
             for (joint, coef) in terms {
@@ -85,11 +91,22 @@ impl<T: Real> Readings<'_, T> {
         }
         let mut sum = T::zero();
         for (i, a) in m.actuators.iter().enumerate() {
+            if let Transmission::Tendon(t) = a.transmission
+                && self.sim.tendons[t].spatial
+            {
+                let force = self.work.forces.actuator_force[i] * T::lit(a.gear[0]);
+                for (dof, arm) in self.sim.tendons[t].arms(&self.work.forces.tendon_moments) {
+                    if dof == one.dof_adr {
+                        sum = arm.mul_add(force, sum);
+                    }
+                }
+                continue;
+            }
             let lever = match a.transmission {
                 Transmission::Joint(j) | Transmission::JointInParent(j) => f64::from(j == joint),
                 Transmission::Tendon(t) => match &m.tendons[t].kind {
                     TendonKind::Fixed(terms) => terms.iter().find(|(j, _)| *j == joint).map_or(0.0, |(_, c)| *c),
-                    TendonKind::Spatial => 0.0,
+                    TendonKind::Spatial(_) => 0.0,
                 },
             };
             if lever != 0.0 {
