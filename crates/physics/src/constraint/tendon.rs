@@ -18,7 +18,7 @@ kernel_fn! {
                 let (_, d) = impedance(soft, T::zero());
                 let index = rows.blocks.add();
                 let block = &mut rows.blocks[index];
-                block.reset(Source::TendonFriction, Cost::Dry, 1);
+                block.reset(Source::TendonFriction(i), Cost::Dry, 1);
                 block.on = T::not(T::none());
                 block.d[0] = d;
                 block.mu[0] = T::splat(*loss);
@@ -26,12 +26,13 @@ kernel_fn! {
                 block.tie_joints(t.arms(moments));
             }
             let Some((low, high, soft)) = &t.limit else { continue };
-            for (sign, dist) in [
-                (one, (length - T::splat(low[0])) - T::splat(low[1])),
-                (-one, (T::splat(high[0]) - length) + T::splat(high[1])),
+            for (upper, sign, dist) in [
+                (false, one, (length - T::splat(low[0])) - T::splat(low[1])),
+                (true, -one, (T::splat(high[0]) - length) + T::splat(high[1])),
             ] {
+                let source = Source::TendonLimit { tendon: i, upper };
                 let terms = t.arms(moments).map(|(dof, arm)| (dof, sign * arm));
-                push(rows, Source::TendonLimit(i), soft, dist, sign * velocity, terms);
+                push(rows, source, soft, dist, sign * velocity, terms);
             }
         }
         for limit in &sim.ball_limits {

@@ -103,7 +103,9 @@ fn share_tendons<T: Real>(sim: &Sim<T>, group: &Group<T>, forces: &mut Forces<T>
         let (below, above) = (sum.lt(low), high.lt(sum));
         let outside = T::or(below, above);
         let share = T::select(below, low, high).div(T::select(outside, sum, one));
-        forces.tendon_share[range.tendon] = T::select(outside, share, one);
+        // a sum at its bound does not change with the velocity
+        let free = T::masked(T::and(low.lt(sum), sum.lt(high)), one);
+        forces.tendon_share[range.tendon] = [T::select(outside, share, one), free];
     }
 }
 
@@ -120,11 +122,13 @@ pub(crate) fn actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
         forces.qfrc_passive_actuator.copy_from_slice(&forces.qfrc_passive);
     }
     for (i, actuator) in sim.actuators.iter().enumerate() {
-        let (mut force, slope) = force_and_slope(group, forces, i, actuator);
+        let (mut force, mut slope) = force_and_slope(group, forces, i, actuator);
         if let (false, TransmissionSpec::Tendon { index, .. }) =
             (sim.tendon_force_ranges.is_empty(), &actuator.transmission)
         {
-            force *= forces.tendon_share[*index];
+            let [share, free] = forces.tendon_share[*index];
+            force *= share;
+            slope *= free;
         }
         let (force, slope) = bounded(group, i, actuator, (force, slope));
         forces.actuator_force[i] = force;

@@ -12,4 +12,4 @@ pub(crate) use articulated::{accelerate, bring_inward, factorize, link_accelerat
 pub(crate) use external::link_forces;
 pub(crate) use kinematics::{kinematics, velocities};
 pub(crate) use passive::{joint_passive, measure_tendons, tendon_passive};
-pub(crate) use string::measure_strings;
+pub(crate) use string::{measure_strings, straights};

@@ -77,6 +77,31 @@ fn span_length<T: Real>(motion: &Motion<T>, dofs: &[DofWork<T>], span: &Span<T::
     T::select(found.on, found.length, length)
 }
 
+/// A straight piece of a span, which some lanes may lack.
+pub(crate) struct Straight<T: Real> {
+    pub on: T::Mask,
+    /// Its ends, relative to the references of their trees, or in the world for points that stand still.
+    pub arms: [V3<T>; 2],
+    /// Unit vector from the first end to the second.
+    pub along: V3<T>,
+}
+
+/// The straight pieces of a span: from site to site, and those before and after the geom.
+pub(crate) fn straights<T: Real>(motion: &Motion<T>, span: &Span<T::Scalar>) -> [Option<Straight<T>>; 3] {
+    let arms = [arm(motion, &span.ends[0]), arm(motion, &span.ends[1])];
+    let along = unit3(&between(motion, [&span.ends[0], &span.ends[1]], &arms));
+    let Some(around) = &span.around else {
+        return [Some(Straight { on: T::not(T::none()), arms, along }), None, None];
+    };
+    let found = wrapped(motion, around, &span.ends, &arms);
+    let piece = |on: T::Mask, arms: [V3<T>; 2], along: V3<T>| T::any(on).then_some(Straight { on, arms, along });
+    [
+        piece(T::not(found.on), arms, along),
+        piece(found.on, [arms[0], found.arms[0]], unit3(&found.pieces[0])),
+        piece(found.on, [found.arms[1], arms[1]], unit3(&found.pieces[1])),
+    ]
+}
+
 /// A span that wraps around its geom, in some lanes.
 struct Wrapped<T: Real> {
     on: T::Mask,

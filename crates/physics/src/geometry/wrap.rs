@@ -1,6 +1,6 @@
 //! The way of a string around a sphere or a cylinder between two points.
 //!
-//! It is MuJoCo's `mju_wrap`. The string lies in the plane of the circle that it wraps around. Outside, it touches the
+//! It is `mju_wrap` of MuJoCo 4.0. The string lies in the plane of the circle that it wraps around. Outside, it touches the
 //! circle along an arc. Inside, if the side site is inside, it touches the circle in one point, where both straight
 //! pieces make the same angle with it. Angles follow from sines and cosines by `atan2`, which stays accurate near 0.
 //!
@@ -53,7 +53,6 @@ pub(crate) fn wrap<T: Real>(
             let side = into(axes, side);
             let inner = norm3(&side).lt(radius);
             let near = unit2(&flat(&side));
-            let near = [near[0] * radius, near[1] * radius];
             let not_inner = T::not(inner);
             match (T::any(inner), T::any(not_inner)) {
                 (true, true) => inside(&d, radius).or(inner, &outside(&d, Some(&near), radius)),
@@ -116,63 +115,44 @@ fn plane_of<T: Real>(p: &[V3<T>; 2]) -> [V3<T>; 2] {
     [first, unit3(&cross3(&normal, &first))]
 }
 
-/// A string outside the circle, on the side of `side` if it is given, else the shorter way.
+/// A string outside the circle. It takes the shorter way, and wraps if the straight way is blocked. If `side` lies
+/// opposite to it, between the directions away from both ends, it takes the longer way, and always wraps.
 #[inline(always)]
 fn outside<T: Real>(d: &[V2<T>; 2], side: Option<&V2<T>>, radius: T) -> Arc<T> {
     let (zero, one, tiny) = (T::zero(), T::lit(1.0), T::lit(TINY));
     let [sq0, sq1, square] = [dot2(&d[0], &d[0]), dot2(&d[1], &d[1]), radius * radius];
-    let dif = sub2(&d[1], &d[0]);
-    let dd = dot2(&dif, &dif);
-    let mut off = T::or(T::or(sq0.lt(square), sq1.lt(square)), T::or(radius.lt(tiny), dd.lt(tiny)));
-    // the nearest point of the straight way
-    let at = (-dot2(&dif, &d[0])).div(dd.max(tiny)).max(zero).min(one);
-    let nearest = [at * dif[0] + d[0][0], at * dif[1] + d[0][1]];
-    let clear = square.lt(dot2(&nearest, &nearest));
-    off = T::or(
-        off,
-        match side {
-            None => clear,
-            Some(side) => T::and(clear, T::not(dot2(side, &nearest).lt(zero))),
-        },
-    );
-    // tangents from both points, for both ways around
+    let off = T::or(T::or(sq0.lt(square), sq1.lt(square)), radius.lt(tiny));
+    // the shorter way turns to the left if this is positive
+    let turn = cross2(&d[0], &d[1]);
+    let between = turn.abs().atan2(dot2(&d[0], &d[1]));
+    let right = turn.lt(zero);
+    let long = match side {
+        None => T::none(),
+        Some(side) => {
+            let (from, to) = (cross2(&d[0], side), cross2(side, &d[1]));
+            let (from, to) = (T::select(right, -from, from), T::select(right, -to, to));
+            T::and(from.lt(zero), T::not(zero.lt(to)))
+        }
+    };
+    let sweep = T::select(long, T::lit(std::f64::consts::TAU) - between, between);
+    // what is left of it between the tangents
     let roots = [(sq0 - square).max(zero).sqrt(), (sq1 - square).max(zero).sqrt()];
+    let angle = sweep - roots[0].atan2(radius) - roots[1].atan2(radius);
+    let sign = T::select(T::xor(right, long), one, -one);
+    let (a, b) = (sign * radius * roots[0], sign * radius * roots[1]);
     let (inv0, inv1) = (one.div(sq0.max(tiny)), one.div(sq1.max(tiny)));
-    let tangents = |sign: T| {
-        let (a, b) = (sign * radius * roots[0], sign * radius * roots[1]);
-        [
-            [(d[0][0] * square + a * d[0][1]) * inv0, (d[0][1] * square - a * d[0][0]) * inv0],
-            [(d[1][0] * square - b * d[1][1]) * inv1, (d[1][1] * square + b * d[1][0]) * inv1],
-        ]
-    };
-    let goodness = |way: &[V2<T>; 2]| {
-        let good = match side {
-            Some(side) => dot2(&unit2(&[way[0][0] + way[1][0], way[0][1] + way[1][1]]), side),
-            None => {
-                let apart = sub2(&way[0], &way[1]);
-                -dot2(&apart, &apart)
-            }
-        };
-        T::select(intersect(&d[0], &way[0], &d[1], &way[1]), T::lit(-10000.0), good)
-    };
-    let (left, right) = (tangents(one), tangents(-one));
-    let first = goodness(&right).lt(goodness(&left));
-    let pick = |i: usize, k: usize| T::select(first, left[i][k], right[i][k]);
-    let points = [[pick(0, 0), pick(0, 1)], [pick(1, 0), pick(1, 1)]];
-    off = T::or(off, intersect(&d[0], &points[0], &d[1], &points[1]));
-    // the angle between the points, or what is left of a full turn
-    let turn = points[0][1] * points[1][0] - points[0][0] * points[1][1];
-    let angle = turn.abs().atan2(dot2(&points[0], &points[1]));
-    let long = T::or(T::and(T::not(first), zero.lt(turn)), T::and(first, turn.lt(zero)));
-    let angle = T::select(long, T::lit(std::f64::consts::TAU) - angle, angle);
-    Arc { on: T::not(off), points, length: radius * angle }
+    let points = [
+        [(d[0][0] * square + a * d[0][1]) * inv0, (d[0][1] * square - a * d[0][0]) * inv0],
+        [(d[1][0] * square - b * d[1][1]) * inv1, (d[1][1] * square + b * d[1][0]) * inv1],
+    ];
+    Arc { on: T::not(T::or(off, angle.lt(zero))), points, length: radius * angle }
 }
 
 /// A string that touches the circle from inside, in one point.
 ///
-/// The point follows from the sine `z` of the angle between the string and the radius there:
-/// `asin(A z) + asin(B z) - 2 asin(z) + G = 0`, where `A` and `B` are the radius by the distances of the ends, and `G` is
-/// the angle between them. MuJoCo's iteration ends at the same tolerance.
+/// The point follows from the angle `x` between the string and the radius there:
+/// `asin(A sin x) + asin(B sin x) - 2 x + G = 0`, where `A` and `B` are the radius by the distances of the ends, and `G`
+/// is the angle between them. MuJoCo's iteration starts and ends at the same points.
 #[inline(always)]
 fn inside<T: Real>(d: &[V2<T>; 2], radius: T) -> Arc<T> {
     let (zero, one, tiny, two) = (T::zero(), T::lit(1.0), T::lit(TINY), T::lit(2.0));
@@ -189,15 +169,15 @@ fn inside<T: Real>(d: &[V2<T>; 2], radius: T) -> Arc<T> {
     let middle = unit2(&[(d[0][0] + d[1][0]) * T::lit(0.5), (d[0][1] + d[1][1]) * T::lit(0.5)]);
 
     let (a, b) = (radius.div(len0.max(tiny)), radius.div(len1.max(tiny)));
-    let turn = d[0][0] * d[1][1] - d[0][1] * d[1][0];
+    let turn = cross2(&d[0], &d[1]);
     let along = dot2(&d[0], &d[1]);
     let cosine = along.div((len0 * len1).max(tiny));
     off = T::or(off, cosine.lt(T::lit(TINY - 1.0)));
-    let angle = turn.abs().atan2(along);
-    let value = |z: T| asin(a * z) + asin(b * z) - two * asin(z) + angle;
+    let between = turn.abs().atan2(along);
+    let value = |x: T, sin: T| asin(a * sin) + asin(b * sin) - two * x + between;
     let tolerance = T::lit(f64::max(1e-6, 16.0 * T::EPSILON));
-    let mut z = T::lit(1.0 - 1e-7);
-    let mut f = value(z);
+    let (mut x, mut sin, mut cos) = (T::lit(std::f64::consts::FRAC_PI_2), one, zero);
+    let mut f = value(x, sin);
     // lanes without a solution touch in the middle
     let mut solved = T::not(T::or(T::lit(1.0 - TINY).lt(cosine), zero.lt(f)));
     solved = T::and(solved, T::not(off));
@@ -206,13 +186,14 @@ fn inside<T: Real>(d: &[V2<T>; 2], radius: T) -> Arc<T> {
         if !T::any(busy) {
             break;
         }
-        let slope =
-            a.div(cosine_of(a * z).max(tiny)) + b.div(cosine_of(b * z).max(tiny)) - two.div(cosine_of(z).max(tiny));
-        let next = z - f.div(slope);
-        let stuck = T::and(busy, T::or((-tiny).lt(slope), z.lt(next)));
+        let rate = |share: T| (share * cos).div(cosine_of(share * sin).max(tiny));
+        let slope = rate(a) + rate(b) - two;
+        let next = x - f.div(slope);
+        let stuck = T::and(busy, T::or((-tiny).lt(slope), x.lt(next)));
         busy = T::and(busy, T::not(stuck));
-        z = T::select(busy, next, z);
-        f = T::select(busy, value(z), f);
+        x = T::select(busy, next, x);
+        (sin, cos) = x.sin_cos();
+        f = T::select(busy, value(x, sin), f);
         let beyond = T::and(busy, tolerance.lt(f));
         solved = T::and(solved, T::not(T::or(stuck, beyond)));
         busy = T::and(busy, T::and(solved, tolerance.lt(f.abs())));
@@ -220,25 +201,10 @@ fn inside<T: Real>(d: &[V2<T>; 2], radius: T) -> Arc<T> {
     solved = T::and(solved, T::not(busy));
     let left = zero.lt(turn);
     let from = unit2(&[T::select(left, d[0][0], d[1][0]), T::select(left, d[0][1], d[1][1])]);
-    let (sin, cos) = (asin(z) - asin(T::select(left, a, b) * z)).sin_cos();
+    let (sin, cos) = (x - asin(T::select(left, a, b) * sin)).sin_cos();
     let touch = [cos * from[0] - sin * from[1], sin * from[0] + cos * from[1]];
     let point = [radius * T::select(solved, touch[0], middle[0]), radius * T::select(solved, touch[1], middle[1])];
     Arc { on: T::not(off), points: [point; 2], length: zero }
-}
-
-/// Whether the segments from `a` to `b` and from `c` to `d` meet.
-#[inline(always)]
-fn intersect<T: Real>(a: &V2<T>, b: &V2<T>, c: &V2<T>, d: &V2<T>) -> T::Mask {
-    let (zero, one, tiny) = (T::zero(), T::lit(1.0), T::lit(TINY));
-    let (first, second, gap) = (sub2(b, a), sub2(d, c), sub2(a, c));
-    let det = second[1] * first[0] - second[0] * first[1];
-    let parallel = det.abs().lt(tiny);
-    let inverse = one.div(T::select(parallel, one, det));
-    let s = (second[0] * gap[1] - second[1] * gap[0]) * inverse;
-    let t = (first[0] * gap[1] - first[1] * gap[0]) * inverse;
-    let out_s = T::or(s.lt(zero), one.lt(s));
-    let out_t = T::or(t.lt(zero), one.lt(t));
-    T::not(T::or(parallel, T::or(out_s, out_t)))
 }
 
 /// The cosine of an angle between 0 and a quarter turn from its sine.
@@ -272,6 +238,11 @@ fn out_of<T: Real>(axes: &Rot<T>, v: &V3<T>) -> V3<T> {
 #[inline(always)]
 fn dot2<T: Real>(a: &V2<T>, b: &V2<T>) -> T {
     a[0] * b[0] + a[1] * b[1]
+}
+
+#[inline(always)]
+fn cross2<T: Real>(a: &V2<T>, b: &V2<T>) -> T {
+    a[0] * b[1] - a[1] * b[0]
 }
 
 #[inline(always)]

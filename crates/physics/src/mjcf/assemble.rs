@@ -13,8 +13,8 @@ use super::settings::{Settings, entries};
 use super::tree::{BodySpec, CameraSpec, LightSpec, SiteSpec};
 use super::value::Attrs;
 use super::{
-    actuator, asset, contact, custom, equality, geom, inertia, mass_matrix, mesh, schema, sensor, settings, statistics,
-    tendon, tree,
+    actuator, asset, contact, custom, equality, geom, inertia, mass_matrix, mesh, pose, schema, sensor, settings,
+    statistics, tendon, tree,
 };
 use crate::hint::{did_you_mean, nearest};
 use crate::model::*;
@@ -82,7 +82,7 @@ pub(crate) fn compile(root: &Element, file: &ReadFile, room: &Room) -> Result<Mo
     model.sensors = sensor::compile(root, &names, &model, room)?;
     model.keyframes = custom::keyframes(root, &model, room)?;
 
-    let pose = mass_matrix::Pose::new(&model);
+    let pose = pose::Pose::new(&model);
     model.equalities = equality::compile(root, &defaults, &names, &model, &pose)?;
     tendon::measure(&mut model, &pose);
     let moments = tendon::moments(&model, &pose);

@@ -3,9 +3,9 @@
 use super::defaults::Defaults;
 use super::document::Element;
 use super::error::MjcfError;
-use super::mass_matrix::Pose;
 use super::math::{EPS, IDENTITY, mul_quat, quat_norm, rotate, sub};
 use super::names::{Names, Registry};
+use super::pose::Pose;
 use super::settings::entries;
 use super::solver_params::{SOLIMP, SOLREF};
 use super::value::Attrs;

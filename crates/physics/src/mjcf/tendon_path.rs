@@ -2,14 +2,14 @@
 
 use super::document::Element;
 use super::error::MjcfError;
-use super::mass_matrix::{Pose, motion};
 use super::math::{add, axes, dot, norm, scale, sub};
 use super::names::Registry;
+use super::pose::{Pose, motion};
 use super::room::Room;
 use super::value::numbers;
 use crate::geometry::wrap::{unit3, wrap};
 use crate::model::{GeomType, Model, PathPart, PathSpan, TendonKind, Vec3};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Memory of the kernels for a degree of freedom that one end of a span moves with.
 const LEVER: usize = 32;
@@ -133,13 +133,9 @@ pub(crate) fn moments(model: &Model, pose: &Pose, kind: &TendonKind) -> Vec<(usi
     for span in kind.spans() {
         for [from, to] in pieces(model, pose, &span).0 {
             let along = scale(unit3(&sub(to.1, from.1)), 1.0 / span.divisor);
-            let [first, last] = [from.0, to.0].map(|b| model.dofs_of_body(b));
-            let both: BTreeSet<usize> = {
-                let first: BTreeSet<usize> = first.iter().copied().collect();
-                last.iter().copied().filter(|d| first.contains(d)).collect()
-            };
+            let [first, last] = model.dofs_between([from.0, to.0]);
             for (dofs, point, sign) in [(first, from.1, -1.0), (last, to.1, 1.0)] {
-                for dof in dofs.into_iter().filter(|d| !both.contains(d)) {
+                for dof in dofs {
                     let arm = dot(motion(model, pose, dof, point).linear, along);
                     *arms.entry(dof).or_default() += sign * arm;
                 }

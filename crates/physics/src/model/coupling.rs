@@ -75,6 +75,17 @@ impl Model {
         }
         dofs
     }
+
+    /// Degrees of freedom that move the first of two bodies only, and the second only.
+    pub(crate) fn dofs_between(&self, bodies: [usize; 2]) -> [Vec<usize>; 2] {
+        let [mut first, mut second] = bodies.map(|b| self.dofs_of_body(b));
+        // those that move both are nearest to the root
+        while first.last().is_some_and(|dof| second.last() == Some(dof)) {
+            first.pop();
+            second.pop();
+        }
+        [first, second]
+    }
 }
 
 /// A tendon (MuJoCo `tendon_*`). The length of a fixed one is in the units of the joints (m, rad or a mix) times the

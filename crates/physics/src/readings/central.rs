@@ -224,6 +224,16 @@ impl<T: Real> Kernel<T> for Wrenches<'_, T> {
                 }
             }
         }
+        for string in readings.string_forces() {
+            for (side, body) in string.bodies.into_iter().enumerate() {
+                if body != 0 {
+                    let root = &sim.coms[sim.model.bodies[body].root_id];
+                    let arm = readings.arm_from(root, string.trees[side], &string.points[side]);
+                    let force = (&string.force, &[T::zero(); 3]);
+                    readings.add_wrench(body, &arm, force, (side == 1, string.on), &mut out);
+                }
+            }
+        }
         for (body, push) in group.xfrc_applied.iter().enumerate().skip(1) {
             let root = &sim.coms[sim.model.bodies[body].root_id];
             let arm = readings.separation(root, &sim.coms[body]);

@@ -170,7 +170,7 @@ impl<T: Real> Readings<'_, T> {
         LimitReading {
             pos: T::masked(on, rest - margin),
             vel: T::masked(on, -rate),
-            force: self.limit_force(Source::BallLimit(one.dof_adr)),
+            force: self.limit_force(|s| s == Source::BallLimit(one.dof_adr)),
         }
     }
 
@@ -186,15 +186,16 @@ impl<T: Real> Readings<'_, T> {
         let length = self.tendon_length(tendon);
         let (low, high) = (length - T::lit(t.range[0]), T::lit(t.range[1]) - length);
         let (pos, vel) = reached(low, high, T::lit(t.margin), self.tendon_velocity(tendon));
-        LimitReading { pos, vel, force: self.limit_force(Source::TendonLimit(tendon)) }
+        let own = |s| matches!(s, Source::TendonLimit { tendon: t, .. } if t == tendon);
+        LimitReading { pos, vel, force: self.limit_force(own) }
     }
 
     /// Force of the first row that a limit has in a lane.
     #[inline(always)]
-    fn limit_force(&self, source: Source) -> T {
+    fn limit_force(&self, own: impl Fn(Source) -> bool) -> T {
         let mut force = T::zero();
         let mut left = T::not(T::none());
-        for block in self.work.rows.blocks.iter().filter(|b| b.source == source) {
+        for block in self.work.rows.blocks.iter().filter(|b| own(b.source)) {
             force = T::select(T::and(left, block.on), block.force[0], force);
             left = T::and(left, T::not(block.on));
         }

@@ -3,7 +3,6 @@
 use super::link::Mount;
 use crate::lanes::Real;
 use crate::model::{GeomType, Model, PathSpan, TendonKind};
-use std::collections::{BTreeMap, BTreeSet};
 
 /// The path of a spatial tendon.
 #[derive(Clone, Debug)]
@@ -60,14 +59,6 @@ pub(super) struct Mounts<'a, C> {
     pub trees: &'a [usize],
 }
 
-/// The degrees of freedom that move one of two bodies only, with 0 or 1 for which.
-fn apart(model: &Model, bodies: [usize; 2]) -> Vec<(usize, usize)> {
-    let [first, second] = bodies.map(|b| model.dofs_of_body(b));
-    let sets = [&first, &second].map(|dofs| dofs.iter().copied().collect::<BTreeSet<usize>>());
-    let of_first = first.iter().filter(|d| !sets[1].contains(d)).map(|d| (*d, 0));
-    of_first.chain(second.iter().filter(|d| !sets[0].contains(d)).map(|d| (*d, 1))).collect()
-}
-
 /// The bodies at the ends of the straight pieces that a span may have: from site to site, or around a geom.
 fn pieces(model: &Model, span: &PathSpan) -> Vec<[usize; 2]> {
     let [first, second] = span.sites.map(|s| model.sites[s].body);
@@ -81,11 +72,18 @@ fn pieces(model: &Model, span: &PathSpan) -> Vec<[usize; 2]> {
 
 /// The degrees of freedom that change the length of a spatial tendon, in order; none for a fixed one.
 pub(super) fn dofs(model: &Model, kind: &TendonKind) -> Vec<usize> {
-    let mut dofs = BTreeSet::new();
-    for piece in kind.spans().iter().flat_map(|span| pieces(model, span)) {
-        dofs.extend(apart(model, piece).into_iter().map(|(dof, _)| dof));
-    }
-    dofs.into_iter().collect()
+    let pieces = kind.spans().into_iter().flat_map(|span| pieces(model, &span));
+    let mut dofs: Vec<usize> = pieces.flat_map(|bodies| model.dofs_between(bodies)).flatten().collect();
+    dofs.sort_unstable();
+    dofs.dedup();
+    dofs
+}
+
+/// What moves one of two bodies and not the other, for a tendon with these degrees of freedom.
+fn levers(model: &Model, dofs: &[usize], bodies: [usize; 2]) -> Vec<Lever> {
+    let between = model.dofs_between(bodies);
+    let ends = between.iter().enumerate().flat_map(|(end, list)| list.iter().map(move |dof| (*dof, end)));
+    ends.filter_map(|(dof, end)| dofs.binary_search(&dof).ok().map(|place| Lever { place, dof, end })).collect()
 }
 
 /// Prepares the paths of the spatial tendons.
@@ -97,12 +95,8 @@ pub(super) fn strings<T: Real>(model: &Model, mounts: &Mounts<T::Scalar>) -> Vec
         if !matches!(t.kind, TendonKind::Spatial(_)) {
             continue;
         }
-        let places: BTreeMap<usize, usize> =
-            dofs(model, &t.kind).into_iter().enumerate().map(|(place, dof)| (dof, place)).collect();
-        let levers = |bodies: [usize; 2]| -> Vec<Lever> {
-            let lever = |(dof, end): (usize, usize)| Lever { place: places[&dof], dof, end };
-            apart(model, bodies).into_iter().map(lever).collect()
-        };
+        let dofs = dofs(model, &t.kind);
+        let levers = |bodies: [usize; 2]| levers(model, &dofs, bodies);
         let span = |s: PathSpan| {
             let [first, second] = s.sites.map(|i| model.sites[i].body);
             let around = s.wrap.map(|(geom, side)| {

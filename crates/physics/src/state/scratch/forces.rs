@@ -22,8 +22,8 @@ pub(crate) struct Forces<T: Real> {
     pub tendon_moments: Vec<T>,
     /// Negative derivative of each tendon's force with respect to its velocity, with `implicitfast`.
     pub minus_tendon_deriv: Vec<T>,
-    /// Factor of the actuator forces on each tendon: below 1 if their sum is out of bounds.
-    pub tendon_share: Vec<T>,
+    /// Factors of the actuator forces on each tendon and of their derivatives: not 1 if the sum is out of bounds.
+    pub tendon_share: Vec<[T; 2]>,
     /// External torque and force on every link: gravity compensation, fluid, and pushes (`xfrc_applied`). Empty for
     /// none.
     pub link_applied: Vec<V6<T>>,
@@ -44,7 +44,7 @@ impl<T: Real> Forces<T> {
             tendon_velocity: vec![z; sim.tendons.len()],
             tendon_moments: vec![z; sim.tendons.iter().map(|t| t.dofs.len()).sum()],
             minus_tendon_deriv: vec![z; sim.tendons.len()],
-            tendon_share: vec![T::lit(1.0); sim.tendons.len()],
+            tendon_share: vec![[T::lit(1.0); 2]; sim.tendons.len()],
             link_applied: Vec::with_capacity(nl),
             actuator_force: vec![z; sim.model.nu],
         }
