@@ -189,14 +189,13 @@ fn inside<T: Real>(d: &[V2<T>; 2], radius: T) -> Arc<T> {
         let rate = |share: T| (share * cos).div(cosine_of(share * sin).max(tiny));
         let slope = rate(a) + rate(b) - two;
         let next = x - f.div(slope);
-        let stuck = T::and(busy, T::or((-tiny).lt(slope), x.lt(next)));
-        busy = T::and(busy, T::not(stuck));
+        let flat = T::and(busy, (-tiny).lt(slope));
+        solved = T::and(solved, T::not(flat));
+        busy = T::and(busy, solved);
         x = T::select(busy, next, x);
         (sin, cos) = x.sin_cos();
         f = T::select(busy, value(x, sin), f);
-        let beyond = T::and(busy, tolerance.lt(f));
-        solved = T::and(solved, T::not(T::or(stuck, beyond)));
-        busy = T::and(busy, T::and(solved, tolerance.lt(f.abs())));
+        busy = T::and(busy, tolerance.lt(f.abs()));
     }
     solved = T::and(solved, T::not(busy));
     let left = zero.lt(turn);

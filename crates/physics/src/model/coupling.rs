@@ -26,7 +26,7 @@ pub enum PathPart {
     },
     /// The end of one branch of the path and the start of the next.
     Pulley {
-        /// What the lengths of the branch behind are divided by.
+        /// Divisor of the lengths of the branch behind it.
         divisor: f64,
     },
 }
@@ -38,7 +38,7 @@ pub struct PathSpan {
     pub sites: [usize; 2],
     /// The geom to wrap around and its side site, if any.
     pub wrap: Option<(usize, Option<usize>)>,
-    /// What its length is divided by.
+    /// Divisor of its length.
     pub divisor: f64,
 }
 

@@ -16,9 +16,9 @@ pub(crate) struct StringSpec<C> {
 #[derive(Clone, Debug)]
 pub(crate) struct Span<C> {
     pub ends: [Spot<C>; 2],
-    /// What its length counts: the inverse of the pulley's divisor.
+    /// Weight of its length: the inverse of the pulley's divisor.
     pub share: C,
-    /// What moves the ends against each other.
+    /// The degrees of freedom that move the ends against each other.
     pub levers: Vec<Lever>,
     pub around: Option<Around<C>>,
 }
@@ -30,7 +30,7 @@ pub(crate) struct Around<C> {
     pub radius: C,
     pub cylinder: bool,
     pub side: Option<Spot<C>>,
-    /// What moves the first end against the geom, and the geom against the second end.
+    /// The same for the first end and the geom, and for the geom and the second end.
     pub levers: [Vec<Lever>; 2],
 }
 
@@ -79,7 +79,7 @@ pub(super) fn dofs(model: &Model, kind: &TendonKind) -> Vec<usize> {
     dofs
 }
 
-/// What moves one of two bodies and not the other, for a tendon with these degrees of freedom.
+/// The degrees of freedom that move one of two bodies and not the other, for a tendon with the degrees of freedom `dofs`.
 fn levers(model: &Model, dofs: &[usize], bodies: [usize; 2]) -> Vec<Lever> {
     let between = model.dofs_between(bodies);
     let ends = between.iter().enumerate().flat_map(|(end, list)| list.iter().map(move |dof| (*dof, end)));
