@@ -86,6 +86,9 @@ fn damping_matrix<T: Real>(sim: &Sim<T>, work: &mut Work<T>, matrix: &TreeMatrix
             }
         }
     }
+    for row in &matrix.dropped {
+        c.damping[row.clone()].fill(T::zero());
+    }
 }
 
 /// `r - dt B a`, into `change`.
