@@ -174,23 +174,38 @@ def hfield(m, i):
     }
 
 
+def fixed_part(m, k):
+    return [m.wrap_objid[k], m.wrap_prm[k]]
+
+
+def spatial_part(m, k):
+    kind, index = m.wrap_type[k], m.wrap_objid[k]
+    if kind == mujoco.mjtWrap.mjWRAP_SITE:
+        return {"Site": index}
+    if kind == mujoco.mjtWrap.mjWRAP_PULLEY:
+        return {"Pulley": {"divisor": m.wrap_prm[k]}}
+    side = int(m.wrap_prm[k])
+    return {"Geom": {"geom": index, "side": "none" if side < 0 else side}}
+
+
 def tendon(m, i):
     start, count = m.tendon_adr[i], m.tendon_num[i]
     fixed = m.wrap_type[start] == mujoco.mjtWrap.mjWRAP_JOINT
-    path = [[m.wrap_objid[k], m.wrap_prm[k]] for k in range(start, start + count)]
+    part = fixed_part if fixed else spatial_part
+    path = [part(m, k) for k in range(start, start + count)]
     armature, damping, *poly = actuated(m, "tendon", i)
     return {
-        "name": name(m, mujoco.mjtObj.mjOBJ_TENDON, i), "kind": {"Fixed": path} if fixed else "Spatial",
+        "name": name(m, mujoco.mjtObj.mjOBJ_TENDON, i), "kind": {"Fixed" if fixed else "Spatial": path},
         "limited": bool(m.tendon_limited[i]), "range": m.tendon_range[i], "margin": m.tendon_margin[i],
         "stiffness": m.tendon_stiffness[i], "stiffness_poly": m.tendon_stiffnesspoly[i],
-        "spring_length": m.tendon_lengthspring[i] if fixed else None, "damping": m.tendon_damping[i] + damping,
+        "spring_length": m.tendon_lengthspring[i], "damping": m.tendon_damping[i] + damping,
         "damping_poly": m.tendon_dampingpoly[i] + poly, "frictionloss": m.tendon_frictionloss[i],
         "armature": m.tendon_armature[i] + armature, "solref_limit": m.tendon_solref_lim[i],
         "solimp_limit": m.tendon_solimp_lim[i], "solref_friction": m.tendon_solref_fri[i],
         "solimp_friction": m.tendon_solimp_fri[i], "group": m.tendon_group[i],
         "actuator_force_range": m.tendon_actfrcrange[i] if m.tendon_actfrclimited[i] else "none",
-        "length0": m.tendon_length0[i] if fixed else None,
-        "invweight0": m.tendon_invweight0[i] if fixed else None,
+        "length0": m.tendon_length0[i],
+        "invweight0": m.tendon_invweight0[i],
     }
 
 
@@ -262,13 +277,10 @@ def sensor_object(kind, i):
 
 def sensor(m, i):
     kind = mujoco.mjtSensor(m.sensor_type[i]).name.removeprefix("mjSENS_")
-    # readings of strings through sites and of meshes are not computed
+    # readings of meshes are not computed
     ends = [(m.sensor_objtype[i], m.sensor_objid[i]), (m.sensor_reftype[i], m.sensor_refid[i])]
     mesh = any(t == mujoco.mjtObj.mjOBJ_GEOM and m.geom_type[k] == mujoco.mjtGeom.mjGEOM_MESH for t, k in ends)
-    string = any(
-        t == mujoco.mjtObj.mjOBJ_TENDON and m.wrap_type[m.tendon_adr[k]] != mujoco.mjtWrap.mjWRAP_JOINT for t, k in ends
-    )
-    supported = kind in SENSORS and not mesh and not string
+    supported = kind in SENSORS and not mesh
     return {
         "name": name(m, mujoco.mjtObj.mjOBJ_SENSOR, i), "kind": SENSORS[kind] if supported else "Unsupported",
         "object": sensor_object(*ends[0]) if supported else "None",

@@ -3,6 +3,8 @@
 import mujoco
 import numpy as np
 
+import string_generator
+
 
 def text(x):
     """A number or a list of them as an attribute."""
@@ -27,6 +29,7 @@ class Generator:
     """Draws a model. It uses only features that `docs/reference/mjcf.md` lists as supported."""
 
     def __init__(self, seed):
+        self.seed = seed
         self.rng = np.random.default_rng([2026, seed])
         # the solver's caps use a separate random stream, because low caps were added later
         self.caps = np.random.default_rng([2029, seed])
@@ -578,8 +581,9 @@ class Generator:
         self.world_sites = [s for s in self.sites if any(f'name="{s}"' in c[0] for c in world if c[0].startswith("<site"))]
         sections = [("tendon", self.tendon_section), ("actuator", self.actuator_section),
                     ("equality", self.equality_section), ("contact", self.contact_section), ("sensor", self.sensor_section)]
-        for name, section in sections:
-            children = section()
+        drawn = [(name, section()) for name, section in sections]
+        strings = string_generator.sections(self, self.seed, element)
+        for name, children in [*drawn, *strings.items()]:
             if children:
                 parts.append(element(name, {}, children))
         return "\n".join(element("mujoco", {"model": "random"}, parts)) + "\n"

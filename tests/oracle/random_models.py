@@ -96,8 +96,8 @@ def moved(model, state, rng, by):
 
 
 def weightless(model, data):
-    """Whether a constraint acts on bodies that only turn about their centers of mass, or a weld on bodies that only slide:
-    MuJoCo has 1e-15 for their inverse weight, and rounding decides what such a constraint does."""
+    """Whether a constraint acts on bodies that only turn about their centers of mass, a weld on bodies that only slide, or one
+    on a string that they hardly move: MuJoCo has 1e-15 for their inverse weight, and rounding decides what such a constraint does."""
     pairs, welded = [model.geom_bodyid[c.geom] for c in data.contact if not c.exclude], []
     for i in np.flatnonzero(data.eq_active):
         ends = [model.eq_obj1id[i], model.eq_obj2id[i]]
@@ -106,6 +106,13 @@ def weightless(model, data):
             pairs.append(model.site_bodyid[ends] if sites else ends)
             if mujoco.mjtEq(model.eq_type[i]) == mujoco.mjtEq.mjEQ_WELD:
                 welded.append(pairs[-1])
+
+    # strings that nothing moves in the reference configuration
+    bound = (model.tendon_limited != 0) | (model.tendon_frictionloss > 0)
+    for i in np.flatnonzero(data.eq_active & (model.eq_type == int(mujoco.mjtEq.mjEQ_TENDON))):
+        bound[[k for k in (model.eq_obj1id[i], model.eq_obj2id[i]) if k >= 0]] = True
+    if np.any(model.tendon_invweight0[bound] < 1e-8):
+        return True
 
     def nothing(bodies, k):
         weights = model.body_invweight0[bodies].sum(axis=0)

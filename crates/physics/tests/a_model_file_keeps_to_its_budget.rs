@@ -81,6 +81,17 @@ fn reading_takes_time_in_proportion() {
     let servos = repeat(20_000, |i| format!("<position joint='j{i}' dampratio='1'/>"));
     assert!(load("servos", &world(&bodies, &format!("<actuator>{servos}</actuator>"))).is_ok());
 
+    // strings that many joints move
+    let joints = "<joint/>".repeat(20);
+    let link = format!("<body>{joints}<geom size='1'/>");
+    let chain = format!("<site name='w'/>{}<site name='e'/>{}", link.repeat(100), "</body>".repeat(100));
+    let strings = |spans: usize| {
+        let path = "<site site='w'/><site site='e'/>".repeat(spans);
+        world(&chain, &format!("<tendon><spatial>{path}</spatial></tendon>"))
+    };
+    assert!(load("a string", &strings(1000)).is_ok());
+    refused("a long string", &strings(20_000), MEMORY);
+
     // one tree with a large mass matrix
     let tree = format!("<body><freejoint/><geom size='1'/>{}</body>", repeat(4000, one));
     let model = load("tree", &world(&tree, "")).expect("it is not too large");

@@ -71,6 +71,8 @@ fn models() -> Vec<Model> {
         "full/terrain",
         "full/equality",
         "full/tendons",
+        "full/strings",
+        "full/strings_implicitfast",
         "full/actuators_implicitfast",
         "full/actuators_rk4",
         "full/medium",

@@ -264,7 +264,15 @@ fn paths_agree(model: &Model, name: &str, start: impl Fn(usize, &mut Vec<f64>, &
 #[test]
 fn every_kind_of_row_agrees_on_both_paths() {
     let folder = common::workspace().join("crates/physics/tests/models");
-    for name in ["full/pile", "full/elliptic", "full/pyramidal", "full/equality", "full/tendons", "full/terrain"] {
+    for name in [
+        "full/pile",
+        "full/elliptic",
+        "full/pyramidal",
+        "full/equality",
+        "full/tendons",
+        "full/strings",
+        "full/terrain",
+    ] {
         let model = Model::from_xml_file(folder.join(format!("{name}.xml"))).unwrap_or_else(|e| panic!("{e}"));
         let start = |state: usize, qpos: &mut Vec<f64>, qvel: &mut Vec<f64>| {
             let mut random = Uniform(state as u64);

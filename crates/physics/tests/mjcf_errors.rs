@@ -167,10 +167,7 @@ fn what_is_not_supported_is_refused_by_name() {
     }
     for (section, parts) in [
         ("<equality><flex flex='b'/></equality>", &["<flex>: deformable bodies are not supported"][..]),
-        ("<tendon><spatial stiffness='1'/></tendon>", &["<spatial> attribute 'stiffness'", "use a fixed tendon"]),
         ("<tendon><spatial springyield='1'/></tendon>", &["<spatial> attribute 'springyield'"]),
-        ("<tendon><spatial limited='true' range='0 1'/></tendon>", &["<spatial> attribute 'limited'"]),
-        ("<tendon><spatial range='0 1'/></tendon>", &["<spatial> attribute 'range'"]),
         ("<deformable><flex/></deformable>", &["<flex>: deformable bodies"]),
         ("<extension><plugin><instance/></plugin></extension>", &["plugins are not supported"]),
         ("<actuator><muscle joint='j'/></actuator>", &["<muscle>: only the actuators motor"]),
@@ -228,10 +225,6 @@ fn copies() {
 
 #[test]
 fn what_is_not_supported_together() {
-    let string = "<tendon><spatial name='t'><site site='s'/><site site='s'/></spatial></tendon>";
-    let with_string = |section: &str| with_section(&format!("{string}{section}"));
-    check(&with_string("<actuator><motor tendon='t'/></actuator>"), &["attribute 'tendon'", "'t' is a spatial tendon"]);
-    check(&with_string("<equality><tendon tendon1='t'/></equality>"), &["attribute 'tendon1'", "spatial tendon"]);
     let meshes = |geom: &str| {
         with_section("<asset><mesh name='m' file='m.obj'/></asset>")
             .replace("<joint name=", &format!("{geom}<joint name="))
@@ -249,6 +242,46 @@ fn what_is_not_supported_together() {
     let fish = with_section("<option density='1000'/>").replace("size=\"1\"", "size='1' fluidshape='ellipsoid'");
     check(&fish, &["bad.xml:4:", "attribute 'fluidshape'", "only fluidshape=\"none\""]);
     assert!(Model::from_xml_str(&fish.replace("1000", "0"), "good.xml").is_ok());
+}
+
+/// MuJoCo's rules for the paths of spatial tendons.
+#[test]
+fn paths_of_strings() {
+    let shapes = "<site name='e' pos='1 0 0'/><geom name='ball' size='1'/><geom name='box' type='box' size='1 1 1'/>";
+    let path = |attrs: &str, parts: &str| {
+        let section = format!("<tendon><spatial name='t' {attrs}>{parts}</spatial></tendon>");
+        with_section(&section).replace("<joint name=", &format!("{shapes}<joint name="))
+    };
+    let (s, e, ball) = ("<site site='s'/>", "<site site='e'/>", "<geom geom='ball'/>");
+    let pulley = "<pulley divisor='2'/>";
+    for (parts, expected) in [
+        (String::new(), "<spatial name=\"t\">: the path of a spatial tendon needs at least two parts"),
+        (s.to_owned(), "<site>: a site needs a neighbor that is not a pulley"),
+        (format!("{s}{pulley}{s}{e}"), "<site>: a site needs a neighbor that is not a pulley"),
+        (format!("{s}{s}"), "<site>: the next site of the path is the same"),
+        (format!("{s}{e}{pulley}"), "<pulley>: the path ends with a pulley"),
+        (format!("{s}{e}{pulley}{pulley}{s}{e}"), "<pulley>: a pulley follows another pulley"),
+        (format!("{ball}{s}{e}"), "<geom>: a geom of the path needs a site before it and one after it"),
+        (format!("{s}{ball}"), "<geom>: a geom of the path needs a site before it and one after it"),
+        (format!("{s}{ball}{ball}{e}"), "<geom>: a geom of the path needs a site before it and one after it"),
+        (format!("{s}<geom geom='box'/>{e}"), "<geom>: the geom 'box' is neither a sphere nor a cylinder"),
+        (format!("{s}<geom geom='bal'/>{e}"), "there is no geom 'bal'; did you mean 'ball'?"),
+        (format!("{s}<geom geom='ball' sidesite='x'/>{e}"), "there is no site 'x'"),
+        (format!("{s}<site/>"), "<site>: the attribute 'site' is missing"),
+        (format!("<pulley/>{s}{e}"), "<pulley>: the attribute 'divisor' is missing"),
+        (format!("<pulley divisor='0'/>{s}{e}"), "<pulley> attribute 'divisor' is '0'; expected a positive number"),
+        (format!("<pulley divisor='-1'/>{s}{e}"), "attribute 'divisor' is '-1'; expected a positive number"),
+        (format!("{s}<joint joint='j' coef='1'/>"), "<joint>"),
+    ] {
+        check(&path("", &parts), &["bad.xml:", expected]);
+    }
+    let good = format!("{pulley}{s}{e}");
+    assert!(Model::from_xml_str(&path("", &good), "good.xml").is_ok(), "a path may start with a pulley");
+    check(&path("width='0'", &good), &["attribute 'width' is '0'; expected a positive number"]);
+    check(&path("range='2 1' limited='true'", &good), &["range"]);
+    check(&path("springlength='2 1'", &good), &["'springlength' goes from 2 to 1"]);
+    check(&path("armature='-1'", &good), &["armature must not be negative"]);
+    check(&path("armature='1'", &format!("{s}{ball}{e}")), &["a tendon with armature cannot wrap around a geom"]);
 }
 
 #[test]

@@ -47,8 +47,22 @@ fn load(text: &str) -> Result<(), TestCaseError> {
         prop_assert!(actuator.act.is_none_or(|a| a < model.na));
     }
     for tendon in &model.tendons {
-        let TendonKind::Fixed(path) = &tendon.kind else { continue };
-        prop_assert!(!path.is_empty() && path.iter().all(|(j, coef)| *j < model.joints.len() && coef.is_finite()));
+        match &tendon.kind {
+            TendonKind::Fixed(path) => {
+                let known = |(j, coef): &(usize, f64)| *j < model.joints.len() && coef.is_finite();
+                prop_assert!(!path.is_empty() && path.iter().all(known));
+            }
+            spatial => {
+                let spans = spatial.spans();
+                prop_assert!(!spans.is_empty());
+                for span in spans {
+                    let around = span.wrap.map_or(0, |(geom, _)| geom);
+                    let side = span.wrap.and_then(|(_, side)| side).unwrap_or(0);
+                    prop_assert!(span.sites.iter().chain([&side]).all(|s| *s < model.sites.len()));
+                    prop_assert!(around < model.geoms.len().max(1) && span.divisor > 0.0);
+                }
+            }
+        }
         prop_assert!(finite(&tendon.spring_length) && finite(&[tendon.length0, tendon.invweight0, tendon.damping]));
     }
     for equality in &model.equalities {
@@ -81,7 +95,7 @@ fn load(text: &str) -> Result<(), TestCaseError> {
 }
 
 /// Pieces of MJCF that are combined at random.
-const PIECES: [&str; 52] = [
+const PIECES: [&str; 58] = [
     "<mujoco>",
     "</mujoco>",
     "<worldbody>",
@@ -120,6 +134,12 @@ const PIECES: [&str; 52] = [
     "<tendon><fixed name='a'>",
     "<joint joint='a' coef='2'/>",
     "</fixed></tendon>",
+    "<tendon><spatial name='a' stiffness='1'>",
+    "<site site='a'/>",
+    "<site name='a'/>",
+    "<geom geom='a' sidesite='a'/>",
+    "<pulley divisor='2'/>",
+    "</spatial></tendon>",
     "<equality>",
     "<weld body1='a'/>",
     "<connect body1='a' anchor='1 2 3'/>",

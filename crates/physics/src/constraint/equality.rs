@@ -13,7 +13,7 @@ kernel_fn! {
             match &spec.tie {
                 Tie::Bodies { points, frames } => bodies_block(sim, group, work, spec, points, frames.as_ref()),
                 Tie::Lengths { follower, leader, poly } => {
-                    lengths_block(group, work, spec, follower, leader.as_ref(), poly);
+                    lengths_block(sim, group, work, spec, follower, leader.as_ref(), poly);
                 }
             }
         }
@@ -179,6 +179,7 @@ fn bodies_block<T: Real>(
 /// One row that keeps a length at a polynomial of another.
 #[inline(always)]
 fn lengths_block<T: Real>(
+    sim: &Sim<T>,
     group: &Group<T>,
     work: &mut Work<T>,
     spec: &EqualitySpec<T::Scalar>,
@@ -187,11 +188,11 @@ fn lengths_block<T: Real>(
     poly: &[T::Scalar; 5],
 ) {
     let z = T::zero();
-    let (q1, v1) = length_and_velocity(group, follower);
+    let (q1, v1) = length_and_velocity(group, work, follower);
     let (mut goal, mut slope) = (T::splat(poly[0]), z);
     let mut v = v1;
     if let Some(leader) = leader {
-        let (q2, v2) = length_and_velocity(group, leader);
+        let (q2, v2) = length_and_velocity(group, work, leader);
         goal = T::splat(poly[4]);
         for i in (0..4).rev() {
             slope = slope.mul_add(q2, goal);
@@ -201,20 +202,36 @@ fn lengths_block<T: Real>(
     }
     let error = q1 - goal;
     let imp = impedance_at(&spec.soft, error);
-    let index = work.rows.blocks.add();
-    let block = &mut work.rows.blocks[index];
+    let Work { rows, forces, .. } = work;
+    let index = rows.blocks.add();
+    let block = &mut rows.blocks[index];
     block.reset(Source::Equality(spec.index), Cost::Equal, 1);
     block.on = T::not(T::none());
     block.d[0] = imp.div((T::lit(1.0) - imp) * T::splat(spec.diag[0]));
     block.u0[0] = v.mul_add(T::splat(spec.soft.b), imp * T::splat(spec.soft.k) * error);
-    let follower = follower.terms.iter().map(|t| (t.dof, T::splat(t.coef)));
-    let leader = leader.into_iter().flat_map(|l| &l.terms).map(|t| (t.dof, -(slope * T::splat(t.coef))));
+    let moments = &forces.tendon_moments[..];
+    let follower = terms_of(sim, moments, follower);
+    let leader = leader.into_iter().flat_map(|l| terms_of(sim, moments, l)).map(|(dof, coef)| (dof, -(slope * coef)));
     block.tie_joints(follower.chain(leader));
+}
+
+/// The degrees of freedom of a length and their coefficients.
+#[inline(always)]
+fn terms_of<'a, T: Real>(
+    sim: &'a Sim<T>,
+    moments: &'a [T],
+    length: &'a Length<T::Scalar>,
+) -> impl Iterator<Item = (usize, T)> + 'a {
+    let terms = length.terms.iter().map(|t| (t.dof, T::splat(t.coef)));
+    terms.chain(length.string.into_iter().flat_map(|t| sim.tendons[t].arms(moments)))
 }
 
 /// A length relative to its zero, and its velocity.
 #[inline(always)]
-fn length_and_velocity<T: Real>(group: &Group<T>, length: &Length<T::Scalar>) -> (T, T) {
+fn length_and_velocity<T: Real>(group: &Group<T>, work: &Work<T>, length: &Length<T::Scalar>) -> (T, T) {
+    if let Some(t) = length.string {
+        return (work.forces.tendon_length[t] - T::splat(length.zero), work.forces.tendon_velocity[t]);
+    }
     let (mut q, mut v) = (-T::splat(length.zero), T::zero());
     for t in &length.terms {
         q = T::splat(t.coef).mul_add(group.qpos[t.qpos], q);

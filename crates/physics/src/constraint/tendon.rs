@@ -2,7 +2,7 @@
 
 use crate::algebra::spatial::quat_to_rotvec;
 use crate::lanes::{Real, kernel_fn};
-use crate::rows::Source;
+use crate::rows::{ConstraintRows, Source};
 use crate::sim::{Cost, Sim, Softness, impedance};
 use crate::state::{Group, Work};
 
@@ -10,32 +10,29 @@ kernel_fn! {
     /// Writes the blocks of tendons' dry friction and limits, and of ball joints' limits.
     pub(crate) fn tendon_blocks<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
         let one = T::lit(1.0);
+        let Work { rows, forces, .. } = work;
         for (i, t) in sim.tendons.iter().enumerate() {
-            let (length, velocity) = (work.forces.tendon_length[i], work.forces.tendon_velocity[i]);
+            let (length, velocity) = (forces.tendon_length[i], forces.tendon_velocity[i]);
+            let moments = &forces.tendon_moments[..];
             if let Some((loss, soft)) = &t.friction {
                 let (_, d) = impedance(soft, T::zero());
-                let index = work.rows.blocks.add();
-                let block = &mut work.rows.blocks[index];
-                block.reset(Source::TendonFriction, Cost::Dry, 1);
+                let index = rows.blocks.add();
+                let block = &mut rows.blocks[index];
+                block.reset(Source::TendonFriction(i), Cost::Dry, 1);
                 block.on = T::not(T::none());
                 block.d[0] = d;
                 block.mu[0] = T::splat(*loss);
                 block.u0[0] = velocity * T::splat(soft.b);
-                block.tie_joints(t.terms.iter().map(|t| (t.dof, T::splat(t.coef))));
+                block.tie_joints(t.arms(moments));
             }
             let Some((low, high, soft)) = &t.limit else { continue };
-            for (sign, dist) in [
-                (one, (length - T::splat(low[0])) - T::splat(low[1])),
-                (-one, (T::splat(high[0]) - length) + T::splat(high[1])),
+            for (upper, sign, dist) in [
+                (false, one, (length - T::splat(low[0])) - T::splat(low[1])),
+                (true, -one, (T::splat(high[0]) - length) + T::splat(high[1])),
             ] {
-                push(
-                    work,
-                    Source::TendonLimit(i),
-                    soft,
-                    dist,
-                    sign * velocity,
-                    t.terms.iter().map(|t| (t.dof, sign * T::splat(t.coef))),
-                );
+                let source = Source::TendonLimit { tendon: i, upper };
+                let terms = t.arms(moments).map(|(dof, arm)| (dof, sign * arm));
+                push(rows, source, soft, dist, sign * velocity, terms);
             }
         }
         for limit in &sim.ball_limits {
@@ -50,7 +47,7 @@ kernel_fn! {
                 rate = axis[k].neg_mul_add(group.qvel[limit.dof + k], rate);
             }
             let terms = (0..3).map(|k| (limit.dof + k, -axis[k]));
-            push(work, Source::BallLimit(limit.dof), &limit.soft, T::splat(limit.range) - angle, rate, terms);
+            push(rows, Source::BallLimit(limit.dof), &limit.soft, T::splat(limit.range) - angle, rate, terms);
         }
     }
 }
@@ -58,7 +55,7 @@ kernel_fn! {
 /// A row that pushes while its distance is below the margin.
 #[inline(always)]
 fn push<T: Real>(
-    work: &mut Work<T>,
+    rows: &mut ConstraintRows<T>,
     source: Source,
     soft: &Softness<T::Scalar>,
     dist: T,
@@ -71,8 +68,8 @@ fn push<T: Real>(
     }
     let violation = dist - T::splat(soft.margin);
     let (imp, d) = impedance(soft, violation);
-    let index = work.rows.blocks.add();
-    let block = &mut work.rows.blocks[index];
+    let index = rows.blocks.add();
+    let block = &mut rows.blocks[index];
     block.reset(source, Cost::Push, 1);
     block.on = on;
     block.d[0] = T::masked(on, d);

@@ -28,8 +28,8 @@ pub(crate) fn advance_activations<T: Real>(sim: &Sim<T>, act: &mut [T], rates: &
     }
 }
 
-/// Force of an actuator before its gear, and its derivative with respect to the velocity of the transmission. Stores
-/// the rate of change of its activation.
+/// Force of an actuator before its gear and its bounds, and its derivative with respect to the velocity of the
+/// transmission. Stores the rate of change of its activation.
 #[inline(always)]
 fn force_and_slope<T: Real>(
     group: &Group<T>,
@@ -66,6 +66,17 @@ fn force_and_slope<T: Real>(
         force = input.mul_add(gain, bias);
         slope = T::splat(g[2]).mul_add(input, T::splat(b[2]));
     }
+    (force, slope)
+}
+
+/// The same within the bounds of the actuator.
+#[inline(always)]
+fn bounded<T: Real>(
+    group: &Group<T>,
+    i: usize,
+    actuator: &ActuatorSpec<T::Scalar>,
+    (mut force, mut slope): (T, T),
+) -> (T, T) {
     if let Some((low, high)) = actuator.force {
         let (low, high) = (T::splat(low), T::splat(high));
         // a force at its bound does not change with the velocity
@@ -79,19 +90,47 @@ fn force_and_slope<T: Real>(
     (force, slope)
 }
 
+/// Factors that bring the sums of the actuator forces on tendons into their bounds.
+#[inline(always)]
+fn share_tendons<T: Real>(sim: &Sim<T>, group: &Group<T>, forces: &mut Forces<T>) {
+    let one = T::lit(1.0);
+    for range in &sim.tendon_force_ranges {
+        let mut sum = T::zero();
+        for i in &range.actuators {
+            sum += force_and_slope(group, forces, *i, &sim.actuators[*i]).0;
+        }
+        let (low, high) = (T::splat(range.low), T::splat(range.high));
+        let (below, above) = (sum.lt(low), high.lt(sum));
+        let outside = T::or(below, above);
+        let share = T::select(below, low, high).div(T::select(outside, sum, one));
+        // a sum at its bound does not change with the velocity
+        let free = T::masked(T::and(low.lt(sum), sum.lt(high)), one);
+        forces.tendon_share[range.tendon] = [T::select(outside, share, one), free];
+    }
+}
+
 /// Forces of the actuators, and, through their gears, of the joints.
 #[inline(always)]
 pub(crate) fn actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     let forces = &mut work.forces;
-    let bounded = !sim.joint_force_ranges.is_empty();
-    if bounded {
+    share_tendons(sim, group, forces);
+    let limited = !sim.joint_force_ranges.is_empty();
+    if limited {
         // the sum of the actuator forces has its own bounds
         forces.qfrc_passive_actuator.fill(T::zero());
     } else {
         forces.qfrc_passive_actuator.copy_from_slice(&forces.qfrc_passive);
     }
     for (i, actuator) in sim.actuators.iter().enumerate() {
-        let (force, slope) = force_and_slope(group, forces, i, actuator);
+        let (mut force, mut slope) = force_and_slope(group, forces, i, actuator);
+        if let (false, TransmissionSpec::Tendon { index, .. }) =
+            (sim.tendon_force_ranges.is_empty(), &actuator.transmission)
+        {
+            let [share, free] = forces.tendon_share[*index];
+            force *= share;
+            slope *= free;
+        }
+        let (force, slope) = bounded(group, i, actuator, (force, slope));
         forces.actuator_force[i] = force;
         let qfrc = &mut forces.qfrc_passive_actuator;
         match &actuator.transmission {
@@ -105,14 +144,19 @@ pub(crate) fn actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
                 }
             }
             TransmissionSpec::Tendon { index, gear } => {
-                let pull = force * T::splat(*gear);
-                for term in &sim.tendons[*index].terms {
-                    qfrc[term.dof] = pull.mul_add(T::splat(term.coef), qfrc[term.dof]);
+                let gear = T::splat(*gear);
+                let pull = force * gear;
+                for (dof, arm) in sim.tendons[*index].arms(&forces.tendon_moments) {
+                    qfrc[dof] = pull.mul_add(arm, qfrc[dof]);
+                }
+                if sim.damped_tendons.is_some() {
+                    let sum = &mut forces.minus_tendon_deriv[*index];
+                    *sum = (gear * gear).neg_mul_add(slope, *sum);
                 }
             }
         }
     }
-    if bounded {
+    if limited {
         for (dof, low, high) in &sim.joint_force_ranges {
             let (low, high, force) = (T::splat(*low), T::splat(*high), forces.qfrc_passive_actuator[*dof]);
             // a force at its bound does not change with the velocity

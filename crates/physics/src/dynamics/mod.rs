@@ -5,9 +5,11 @@ mod articulated;
 mod external;
 mod kinematics;
 mod passive;
+mod string;
 
 pub(crate) use actuation::{actuation, advance_activations};
 pub(crate) use articulated::{accelerate, bring_inward, factorize, link_accelerations, reduce_free_root};
 pub(crate) use external::link_forces;
 pub(crate) use kinematics::{kinematics, velocities};
 pub(crate) use passive::{joint_passive, measure_tendons, tendon_passive};
+pub(crate) use string::{measure_strings, straights};

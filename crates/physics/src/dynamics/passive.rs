@@ -58,14 +58,20 @@ fn add_ball_spring<T: Real>(
 /// Lengths and velocities of the tendons.
 #[inline(always)]
 pub(crate) fn measure_tendons<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
+    let Work { forces, strings, .. } = work;
+    forces.tendon_moments.copy_from_slice(&strings.moments);
     for (i, t) in sim.tendons.iter().enumerate() {
+        if t.spatial {
+            (forces.tendon_length[i], forces.tendon_velocity[i]) = (strings.length[i], strings.velocity[i]);
+            continue;
+        }
         let (mut length, mut velocity) = (T::zero(), T::zero());
         for term in &t.terms {
             length = T::splat(term.coef).mul_add(group.qpos[term.qpos], length);
             velocity = T::splat(term.coef).mul_add(group.qvel[term.dof], velocity);
         }
-        work.forces.tendon_length[i] = length;
-        work.forces.tendon_velocity[i] = velocity;
+        forces.tendon_length[i] = length;
+        forces.tendon_velocity[i] = velocity;
     }
 }
 
@@ -73,14 +79,20 @@ pub(crate) fn measure_tendons<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mu
 #[inline(always)]
 pub(crate) fn tendon_passive<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
     let z = T::zero();
+    let forces = &mut work.forces;
     for (i, t) in sim.tendons.iter().enumerate() {
-        let length = work.forces.tendon_length[i];
+        let length = forces.tendon_length[i];
         // zero between the slack lengths
         let below = (T::splat(t.slack[0]) - length).max(z);
         let above = (T::splat(t.slack[1]) - length).min(z);
-        let force = (below + above) * T::splat(t.stiffness) - T::splat(t.damping) * work.forces.tendon_velocity[i];
-        for term in &t.terms {
-            work.forces.qfrc_passive[term.dof] = T::splat(term.coef).mul_add(force, work.forces.qfrc_passive[term.dof]);
+        let force = (below + above) * T::splat(t.stiffness) - T::splat(t.damping) * forces.tendon_velocity[i];
+        for (dof, arm) in t.arms(&forces.tendon_moments) {
+            forces.qfrc_passive[dof] = arm.mul_add(force, forces.qfrc_passive[dof]);
+        }
+    }
+    if let Some(matrix) = &sim.damped_tendons {
+        for t in &matrix.tendons {
+            forces.minus_tendon_deriv[*t] = T::splat(sim.tendons[*t].damping);
         }
     }
 }

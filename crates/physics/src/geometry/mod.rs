@@ -8,7 +8,7 @@
 //! Pairs with a fixed number of candidate contacts ([`round`], [`plane`], and spheres on boxes) use all lanes at once.
 //! The others ([`capsule_box`], [`box_box`], [`height`]) choose among many features. They process one agent at a time,
 //! with branches, and fill a [`Touches`]. [`field_capsule`] combines both methods. [`convex`] finds the contacts of all
-//! other pairs by iteration.
+//! other pairs by iteration. [`wrap`] is the way of a string around a shape.
 
 pub(crate) mod box_box;
 pub(crate) mod capsule_box;
@@ -21,6 +21,7 @@ mod prism_box;
 pub(crate) mod round;
 #[cfg(test)]
 mod tests;
+pub(crate) mod wrap;
 
 use crate::algebra::spatial::*;
 use crate::lanes::Real;

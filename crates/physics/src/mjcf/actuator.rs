@@ -9,7 +9,7 @@ use super::mass_matrix::MassMatrix;
 use super::math::{MIN_VAL, rotate};
 use super::names::Registry;
 use super::settings::{Settings, entries};
-use super::tendon::{self, require_fixed};
+use super::tendon::Moments;
 use super::value::{Attrs, Tristate, polynomial};
 use crate::model::{Actuator, Dynamics, JointType, Model, Transmission};
 
@@ -84,7 +84,7 @@ fn actuator(
 ) -> Result<Actuator, MjcfError> {
     let element = attrs.element;
     let mut actuator = read(attrs, ends)?;
-    actuator.transmission = target(element, names, model)?;
+    actuator.transmission = target(element, names)?;
     check_limit(attrs, "forcelimited", "forcerange", actuator.force_range, settings)?;
     inherit_range(attrs, ends, &mut actuator, model)?;
     let Limits { ctrl_limited, act_limited, .. } = Limits::read(attrs)?;
@@ -122,18 +122,14 @@ fn check_range(
 }
 
 /// Target that the actuator drives.
-fn target(element: &Element, names: &Registry, model: &Model) -> Result<Transmission, MjcfError> {
+fn target(element: &Element, names: &Registry) -> Result<Transmission, MjcfError> {
     let given: Vec<&str> =
         ["joint", "jointinparent", "tendon"].into_iter().filter(|name| element.attr(name).is_some()).collect();
     match given.as_slice() {
         [] => Err(element.invalid("the attribute 'joint' is missing")),
         ["joint"] => names.joints.required(element, "joint").map(Transmission::Joint),
         ["jointinparent"] => names.joints.required(element, "jointinparent").map(Transmission::JointInParent),
-        ["tendon"] => {
-            let tendon = names.tendons.required(element, "tendon")?;
-            require_fixed(element, "tendon", &model.tendons[tendon])?;
-            Ok(Transmission::Tendon(tendon))
-        }
+        ["tendon"] => names.tendons.required(element, "tendon").map(Transmission::Tendon),
         several => Err(element.invalid(format!("there are both '{}'", several.join("' and '")))),
     }
 }
@@ -205,26 +201,24 @@ fn reflect(attrs: &Attrs, actuator: &Actuator, model: &mut Model) -> Result<(), 
 ///
 /// Critical damping is `2 sqrt(kp m)`, where `1/m` is the inverse mass seen through the gear. Source: MuJoCo,
 /// `dampratio`.
-pub(crate) fn resolve_damping(model: &mut Model, mass: &MassMatrix) {
+pub(crate) fn resolve_damping(model: &mut Model, mass: &MassMatrix, tendons: &Moments) {
     for i in 0..model.actuators.len() {
         let actuator = &model.actuators[i];
         let (kp, ratio) = (actuator.gain[0], actuator.bias[2]);
         if kp != -actuator.bias[1] || ratio <= 0.0 {
             continue;
         }
-        let inverse = mass.inverse_form(&moments(model, actuator));
+        let inverse = mass.inverse_form(&moments(model, actuator, tendons));
         let inertia = if inverse > MIN_VAL { 1.0 / inverse } else { 0.0 };
         model.actuators[i].bias[2] = -2.0 * ratio * (kp * inertia).max(0.0).sqrt();
     }
 }
 
 /// The actuator's moment arms in the reference configuration, as `(dof, arm)`.
-fn moments(model: &Model, actuator: &Actuator) -> Vec<(usize, f64)> {
+fn moments(model: &Model, actuator: &Actuator, tendons: &Moments) -> Vec<(usize, f64)> {
     let gear = actuator.gear;
     match actuator.transmission {
-        Transmission::Tendon(t) => {
-            tendon::moments(model, &model.tendons[t]).into_iter().map(|(dof, arm)| (dof, arm * gear[0])).collect()
-        }
+        Transmission::Tendon(t) => tendons[t].iter().map(|(dof, arm)| (*dof, arm * gear[0])).collect(),
         Transmission::Joint(j) | Transmission::JointInParent(j) => {
             let joint = &model.joints[j];
             let mut arms = gear[..joint.kind.dofs()].to_vec();

@@ -13,8 +13,8 @@ use super::settings::{Settings, entries};
 use super::tree::{BodySpec, CameraSpec, LightSpec, SiteSpec};
 use super::value::Attrs;
 use super::{
-    actuator, asset, contact, custom, equality, geom, inertia, mass_matrix, mesh, schema, sensor, settings, statistics,
-    tendon, tree,
+    actuator, asset, contact, custom, equality, geom, inertia, mass_matrix, mesh, pose, schema, sensor, settings,
+    statistics, tendon, tree,
 };
 use crate::hint::{did_you_mean, nearest};
 use crate::model::*;
@@ -74,7 +74,7 @@ pub(crate) fn compile(root: &Element, file: &ReadFile, room: &Room) -> Result<Mo
     let names = registry(root, &bodies)?;
     check_targets(&bodies, &names)?;
     model.hfields = assets.hfields;
-    model.tendons = tendon::compile(root, &defaults, &names, &settings, &model)?;
+    model.tendons = tendon::compile(root, &defaults, &names, &settings, &model, room)?;
     model.pairs = contact::pairs(root, &defaults, &names, &model.geoms)?;
     model.excludes = contact::excludes(root, &names)?;
     mesh::add(&mut model, &assets.meshes, room)?;
@@ -82,14 +82,16 @@ pub(crate) fn compile(root: &Element, file: &ReadFile, room: &Room) -> Result<Mo
     model.sensors = sensor::compile(root, &names, &model, room)?;
     model.keyframes = custom::keyframes(root, &model, room)?;
 
-    let pose = mass_matrix::Pose::new(&model);
+    let pose = pose::Pose::new(&model);
     model.equalities = equality::compile(root, &defaults, &names, &model, &pose)?;
+    tendon::measure(&mut model, &pose);
+    let moments = tendon::moments(&model, &pose);
     let simple: Vec<bool> = bodies.iter().map(|b| b.simple).collect();
-    let mass_matrix = mass_matrix::inverse_weights(&mut model, &pose, &simple, room)
+    let mass_matrix = mass_matrix::inverse_weights(&mut model, &pose, &simple, &moments, room)
         .map_err(|e| bodies[e.body()].element.invalid(e.to_string()))?;
     statistics::compute(&mut model, &pose, &mass_matrix.diagonal, &given);
-    mass_matrix::tendon_inverse_weights(&mut model, &mass_matrix);
-    actuator::resolve_damping(&mut model, &mass_matrix);
+    mass_matrix::tendon_inverse_weights(&mut model, &mass_matrix, &moments);
+    actuator::resolve_damping(&mut model, &mass_matrix, &moments);
     spring_dampers(&mut model, &bodies);
     check_finite(&model, &bodies)?;
     Ok(model)

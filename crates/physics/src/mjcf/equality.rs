@@ -3,12 +3,11 @@
 use super::defaults::Defaults;
 use super::document::Element;
 use super::error::MjcfError;
-use super::mass_matrix::Pose;
 use super::math::{EPS, IDENTITY, mul_quat, quat_norm, rotate, sub};
 use super::names::{Names, Registry};
+use super::pose::Pose;
 use super::settings::entries;
 use super::solver_params::{SOLIMP, SOLREF};
-use super::tendon::require_fixed;
 use super::value::Attrs;
 use crate::model::{Equality, EqualityKind, JointType, Model, Quat, SolImp, SolRef, Vec3};
 
@@ -49,7 +48,7 @@ pub(crate) fn compile(
             "connect" => connect(element, names, model, pose)?,
             "weld" => weld(element, names, model, pose)?,
             "joint" => joints(element, names, model)?,
-            _ => tendons(element, names, model)?,
+            _ => tendons(element, names)?,
         };
         Ok(Equality {
             name: element.text("name").unwrap_or_default().to_owned(),
@@ -172,12 +171,8 @@ fn joints(element: &Element, names: &Registry, model: &Model) -> Result<Equality
     Ok(EqualityKind::Joint { joint1, joint2, polycoef: polycoef(element)? })
 }
 
-fn tendons(element: &Element, names: &Registry, model: &Model) -> Result<EqualityKind, MjcfError> {
+fn tendons(element: &Element, names: &Registry) -> Result<EqualityKind, MjcfError> {
     let tendon1 = names.tendons.required(element, "tendon1")?;
     let tendon2 = second(element, &names.tendons, "tendon2", tendon1)?;
-    require_fixed(element, "tendon1", &model.tendons[tendon1])?;
-    if let Some(tendon) = tendon2 {
-        require_fixed(element, "tendon2", &model.tendons[tendon])?;
-    }
     Ok(EqualityKind::Tendon { tendon1, tendon2, polycoef: polycoef(element)? })
 }

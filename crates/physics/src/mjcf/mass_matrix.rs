@@ -5,8 +5,9 @@
 
 use super::factor::Factor;
 use super::math::*;
+use super::pose::{Motion, Pose, motion};
 use super::room::Room;
-use super::tendon::moments;
+use super::tendon::Moments;
 use crate::budget::OverBudget;
 use crate::model::same_frame::FRAME_EPS;
 use crate::model::{JointType, Model, Tendon, Vec3};
@@ -14,32 +15,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// A tree with more degrees of freedom than this is refused: its dense mass matrix would not fit.
 const MAX_TREE_DOFS: usize = 4096;
-
-/// World poses in the reference configuration.
-pub(crate) struct Pose {
-    /// Body frames.
-    pub body: Vec<Frame>,
-    /// Centers of mass.
-    pub com: Vec<Vec3>,
-}
-
-impl Pose {
-    pub fn new(model: &Model) -> Self {
-        let mut body: Vec<Frame> = Vec::with_capacity(model.bodies.len());
-        for (i, b) in model.bodies.iter().enumerate() {
-            let own = Frame { pos: b.pos, quat: b.quat };
-            body.push(if i == 0 { own } else { body[b.parent].compose(&own) });
-        }
-        let com = body.iter().enumerate().map(|(i, frame)| frame.point(model.inertial_frame(i).0)).collect();
-        Pose { body, com }
-    }
-
-    /// World position of a joint's anchor.
-    pub fn anchor(&self, model: &Model, joint: usize) -> Vec3 {
-        let joint = &model.joints[joint];
-        self.body[joint.body].point(joint.pos)
-    }
-}
 
 /// Why the reference quantities do not exist.
 #[derive(Debug)]
@@ -100,10 +75,11 @@ pub(crate) fn inverse_weights(
     model: &mut Model,
     pose: &Pose,
     simple: &[bool],
+    moments: &Moments,
     room: &Room,
 ) -> Result<MassMatrix, MassMatrixError> {
     let mut mass_matrix = MassMatrix { diagonal: vec![0.0; model.nv], blocks: Vec::new() };
-    let heavy = HeavyTendons::new(model);
+    let heavy = HeavyTendons::new(model, moments);
     let mut first = 0;
     while first < model.nv {
         let root = model.bodies[model.dofs[first].body].root_id;
@@ -139,9 +115,9 @@ pub(crate) fn inverse_weights(
 }
 
 /// Sets the inverse weights of tendons.
-pub(crate) fn tendon_inverse_weights(model: &mut Model, mass: &MassMatrix) {
-    for i in 0..model.tendons.len() {
-        model.tendons[i].invweight0 = mass.inverse_form(&moments(model, &model.tendons[i]));
+pub(crate) fn tendon_inverse_weights(model: &mut Model, mass: &MassMatrix, moments: &Moments) {
+    for (tendon, arms) in model.tendons.iter_mut().zip(moments) {
+        tendon.invweight0 = mass.inverse_form(arms);
     }
 }
 
@@ -155,7 +131,7 @@ fn is_lone_slider(model: &Model, index: usize, heavy: &HeavyTendons) -> bool {
     let aligned = |axis: Vec3| axis.iter().filter(|x| x.abs() > EPS).count() == 1;
     let joints = &model.joints[body.joint_start..body.joint_start + body.joint_count];
     !joints.is_empty()
-        && !joints.iter().any(|j| heavy.0.contains_key(&j.dof_adr))
+        && !joints.iter().any(|j| heavy.by_dof.contains_key(&j.dof_adr))
         && joints.iter().all(|j| j.kind == JointType::Slide && small(&j.pos, FRAME_EPS) && aligned(j.axis))
         && small(&body.ipos, FRAME_EPS)
         && small(&body.iquat[1..], FRAME_EPS)
@@ -164,22 +140,25 @@ fn is_lone_slider(model: &Model, index: usize, heavy: &HeavyTendons) -> bool {
 }
 
 /// Tendons with inertia, by the dofs that they pull.
-struct HeavyTendons(BTreeMap<usize, Vec<usize>>);
+struct HeavyTendons<'a> {
+    by_dof: BTreeMap<usize, Vec<usize>>,
+    moments: &'a Moments,
+}
 
-impl HeavyTendons {
-    fn new(model: &Model) -> Self {
+impl<'a> HeavyTendons<'a> {
+    fn new(model: &Model, moments: &'a Moments) -> Self {
         let mut by_dof: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-        for (i, tendon) in model.tendons.iter().enumerate().filter(|(_, t)| t.armature != 0.0) {
-            for (dof, _) in moments(model, tendon) {
-                by_dof.entry(dof).or_default().push(i);
+        for (i, _) in model.tendons.iter().enumerate().filter(|(_, t)| t.armature != 0.0) {
+            for (dof, _) in &moments[i] {
+                by_dof.entry(*dof).or_default().push(i);
             }
         }
-        HeavyTendons(by_dof)
+        HeavyTendons { by_dof, moments }
     }
 
     /// Tendons that pull any of these dofs, in the model's order.
     fn of(&self, dofs: std::ops::Range<usize>) -> BTreeSet<usize> {
-        self.0.range(dofs).flat_map(|(_, tendons)| tendons.iter().copied()).collect()
+        self.by_dof.range(dofs).flat_map(|(_, tendons)| tendons.iter().copied()).collect()
     }
 }
 
@@ -189,20 +168,6 @@ struct SpatialInertia {
     mass: f64,
     first: Vec3,
     second: [Vec3; 3],
-}
-
-/// Motion axis of one dof: angular velocity, and linear velocity at the tree's reference point.
-#[derive(Clone, Copy)]
-struct Motion {
-    angular: Vec3,
-    linear: Vec3,
-}
-
-impl Motion {
-    /// Linear velocity at a point `r` away from the reference point.
-    fn at(&self, r: Vec3) -> Vec3 {
-        add(self.linear, cross(self.angular, r))
-    }
 }
 
 /// One kinematic tree and its dofs `first..first + motions.len()`.
@@ -250,18 +215,18 @@ impl Tree {
             mass[i * n + i] += model.dofs[self.first + i].armature;
         }
         for tendon in heavy.of(self.first..self.first + n) {
-            self.add_armature(model, &model.tendons[tendon], &mut mass);
+            self.add_armature(model, &model.tendons[tendon], &heavy.moments[tendon], &mut mass);
         }
         mass
     }
 
     /// Adds the inertia of a tendon. As in MuJoCo it couples only dofs of which one is an ancestor of the other: the
     /// mass matrix has no other entries.
-    fn add_armature(&self, model: &Model, tendon: &Tendon, mass: &mut [f64]) {
+    fn add_armature(&self, model: &Model, tendon: &Tendon, moments: &[(usize, f64)], mass: &mut [f64]) {
         let n = self.motions.len();
         let own = self.first..self.first + n;
         // a tendon names a joint once
-        let arms: Vec<(usize, f64)> = moments(model, tendon).into_iter().filter(|(dof, _)| own.contains(dof)).collect();
+        let arms: Vec<(usize, f64)> = moments.iter().copied().filter(|(dof, _)| own.contains(dof)).collect();
         let by_dof: BTreeMap<usize, f64> = arms.iter().copied().collect();
         for (i, at_i) in &arms {
             let mut ancestor = Some(*i);
@@ -361,24 +326,4 @@ fn spatial_inertia(model: &Model, pose: &Pose, b: usize, origin: Vec3) -> Spatia
         }
     }
     SpatialInertia { mass: body.mass, first: scale(r, body.mass), second }
-}
-
-/// Free joints: three world axes, then the body's axes. Ball joints: the body's axes. Others: the joint's axis.
-fn motion(model: &Model, pose: &Pose, dof: usize, origin: Vec3) -> Motion {
-    let joint_index = model.dofs[dof].joint;
-    let joint = &model.joints[joint_index];
-    let k = dof - joint.dof_adr;
-    let frame = &pose.body[joint.body];
-    let turning = |axis: Vec3| {
-        let arm = sub(origin, pose.anchor(model, joint_index));
-        Motion { angular: axis, linear: cross(axis, arm) }
-    };
-    let sliding = |axis: Vec3| Motion { angular: [0.0; 3], linear: axis };
-    match joint.kind {
-        JointType::Free if k < 3 => sliding([0, 1, 2].map(|i| if i == k { 1.0 } else { 0.0 })),
-        JointType::Free => turning(axes(frame.quat)[k - 3]),
-        JointType::Ball => turning(axes(frame.quat)[k]),
-        JointType::Slide => sliding(rotate(frame.quat, joint.axis)),
-        JointType::Hinge => turning(rotate(frame.quat, joint.axis)),
-    }
 }

@@ -8,8 +8,8 @@
 //!
 //! The way of a file: `document` parses the XML and expands includes, `schema` refuses what is misspelled or not
 //! supported, `defaults` lays classes under elements, `tree` reads the bodies, `inertia` gives them mass,
-//! `asset` (with `mesh`), `tendon`, `equality`, `actuator`, `sensor` and `custom` read the rest, `assemble` puts the [`Model`] together,
-//! `mass_matrix` (with `factor`) and `statistics` compute what follows from the reference configuration. `room` counts the memory
+//! `asset` (with `mesh`), `tendon` (with `tendon_path`), `equality`, `actuator`, `sensor` and `custom` read the rest, `assemble` puts the [`Model`] together,
+//! `mass_matrix` (with `pose` and `factor`) and `statistics` compute what follows from the reference configuration. `room` counts the memory
 //! that all of them ask for. [`spec`] edits the document before it is compiled.
 //!
 //! An unsupported element or attribute that changes the dynamics is an error with file and line; it is never skipped.
@@ -35,6 +35,7 @@ mod math;
 mod mesh;
 mod names;
 mod orientation;
+mod pose;
 mod room;
 mod schema;
 mod sensor;
@@ -43,6 +44,7 @@ mod solver_params;
 pub mod spec;
 mod statistics;
 mod tendon;
+mod tendon_path;
 mod tree;
 mod value;
 

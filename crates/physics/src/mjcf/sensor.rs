@@ -6,7 +6,7 @@ use super::names::{Names, Registry};
 use super::room::Room;
 use super::settings::entries;
 use super::value::Attrs;
-use crate::model::{GeomType, JointType, Model, Sensor, SensorObject, SensorType, TendonKind};
+use crate::model::{GeomType, JointType, Model, Sensor, SensorObject, SensorType};
 
 /// Object that a sensor element is attached to, which decides the attributes.
 #[derive(Clone, Copy, PartialEq)]
@@ -132,11 +132,10 @@ fn sensor(element: &Element, names: &Registry, model: &Model, adr: usize) -> Res
     if kind == SensorType::InsideSite {
         intprm[0] = i32::from(attrs.flag_or("enclosed", false)?);
     }
-    // delayed or decimated readings, readings of strings and of meshes are not computed
+    // delayed or decimated readings, and readings of meshes are not computed
     let interval: [f64; 2] = attrs.partial_or("interval", [0.0; 2])?;
     let unknown = |object| match object {
         SensorObject::Geom(g) => model.geoms[g].kind == GeomType::Mesh,
-        SensorObject::Tendon(t) => model.tendons[t].kind == TendonKind::Spatial,
         _ => false,
     };
     if attrs.number_or("delay", 0.0)? != 0.0 || interval != [0.0; 2] || unknown(object) || unknown(reference) {

@@ -1,7 +1,7 @@
 //! Statistics of a model in its reference configuration, as MuJoCo computes them.
 
-use super::mass_matrix::Pose;
 use super::math::*;
+use super::pose::Pose;
 use super::settings::GivenStatistics;
 use crate::model::{Geom, GeomType, Model, Vec3};
 

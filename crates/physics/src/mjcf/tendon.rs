@@ -1,12 +1,15 @@
-//! `<tendon>`: linear combinations of joints. Strings through sites are taken only if they exert no force.
+//! `<tendon>`: linear combinations of joints, and strings through sites.
 
 use super::defaults::Defaults;
 use super::document::Element;
 use super::error::MjcfError;
 use super::limit::{check_limit, is_limited};
 use super::names::Registry;
+use super::pose::Pose;
+use super::room::Room;
 use super::settings::{Settings, entries};
 use super::solver_params::{SOLIMP, SOLREF};
+use super::tendon_path;
 use super::value::{Attrs, numbers, polynomial};
 use crate::model::{JointType, Model, Tendon, TendonKind};
 use std::collections::BTreeSet;
@@ -19,15 +22,35 @@ pub(crate) fn elements(root: &Element) -> impl Iterator<Item = &Element> {
     entries(root, "tendon")
 }
 
-/// Compiles all tendons, but for their inverse weights.
+/// Compiles all tendons, but for their inverse weights and the lengths of spatial ones.
 pub(crate) fn compile(
     root: &Element,
     defaults: &Defaults,
     names: &Registry,
     settings: &Settings,
     model: &Model,
+    room: &Room,
 ) -> Result<Vec<Tendon>, MjcfError> {
-    elements(root).map(|element| tendon(element, defaults, names, settings, model)).collect()
+    elements(root).map(|element| tendon(element, defaults, names, settings, model, room)).collect()
+}
+
+/// Measures the spatial tendons in the reference configuration. Without a given length, their springs rest at the
+/// length in the spring configuration.
+pub(crate) fn measure(model: &mut Model, pose: &Pose) {
+    let spatial: Vec<usize> =
+        (0..model.tendons.len()).filter(|i| matches!(model.tendons[*i].kind, TendonKind::Spatial(_))).collect();
+    let slack = |t: &Tendon| t.spring_length == [UNSET; 2];
+    let rest = spatial.iter().any(|i| slack(&model.tendons[*i])).then(|| Pose::at(model, &model.qpos_spring));
+    for i in spatial {
+        let kind = &model.tendons[i].kind;
+        let length0 = tendon_path::length(model, pose, kind);
+        let at_rest = rest.as_ref().map(|pose| tendon_path::length(model, pose, kind));
+        let tendon = &mut model.tendons[i];
+        tendon.length0 = length0;
+        if let Some(length) = at_rest.filter(|_| slack(tendon)) {
+            tendon.spring_length = [length; 2];
+        }
+    }
 }
 
 /// Checks the values of a `<tendon>` that sets defaults.
@@ -44,7 +67,7 @@ fn read(attrs: &Attrs) -> Result<Tendon, MjcfError> {
     let (damping, damping_poly) = polynomial(attrs, "damping")?;
     Ok(Tendon {
         name: attrs.element.text("name").unwrap_or_default().to_owned(),
-        kind: TendonKind::Spatial,
+        kind: TendonKind::Spatial(Vec::new()),
         limited: is_limited(attrs, "limited", range)?,
         range,
         margin: attrs.number_or("margin", 0.0)?,
@@ -86,12 +109,16 @@ fn tendon(
     names: &Registry,
     settings: &Settings,
     model: &Model,
+    room: &Room,
 ) -> Result<Tendon, MjcfError> {
     let attrs = defaults.attrs(element, None)?;
     let mut tendon = read(&attrs)?;
     check_limit(&attrs, "limited", "range", tendon.range, settings)?;
     let force_range = attrs.array_or("actuatorfrcrange", [0.0; 2])?;
     check_limit(&attrs, "actuatorfrclimited", "actuatorfrcrange", force_range, settings)?;
+    if let Some([low, high]) = tendon.actuator_force_range.filter(|[low, high]| *low > 0.0 || *high < 0.0) {
+        return Err(element.invalid(format!("'actuatorfrcrange' goes from {low} to {high}; it must contain 0")));
+    }
     let [low, high] = tendon.spring_length;
     if low > high {
         return Err(element.invalid(format!("'springlength' goes from {low} to {high}; the first must not be larger")));
@@ -108,8 +135,12 @@ fn tendon(
         }
         tendon.kind = TendonKind::Fixed(path);
     } else {
-        check_spatial(element, &attrs, &tendon, names)?;
-        tendon.spring_length = [0.0; 2];
+        if let Some((owner, attr)) =
+            attrs.find("width").filter(|_| !attrs.number_or("width", 1.0).is_ok_and(|w| w > 0.0))
+        {
+            return Err(owner.bad_value(attr, "a positive number"));
+        }
+        tendon.kind = tendon_path::read(element, names, model, tendon.armature > 0.0, room)?;
     }
     Ok(tendon)
 }
@@ -139,51 +170,14 @@ fn path(element: &Element, names: &Registry, model: &Model) -> Result<Vec<(usize
     Ok(path)
 }
 
-/// A string through sites may exist but not exert a force.
-fn check_spatial(element: &Element, attrs: &Attrs, tendon: &Tendon, names: &Registry) -> Result<(), MjcfError> {
-    let refuse = |attribute: &str| {
-        let reason =
-            "a spatial tendon that exerts a force is not supported; use a fixed tendon or an equality constraint";
-        let element = attrs.find(attribute).map_or(element, |(e, _)| e);
-        Err(element.unsupported(Some(attribute), reason))
-    };
-    let constants = [
-        ("stiffness", [tendon.stiffness].iter().chain(&tendon.stiffness_poly).any(|x| *x != 0.0)),
-        ("damping", [tendon.damping].iter().chain(&tendon.damping_poly).any(|x| *x != 0.0)),
-        ("frictionloss", tendon.frictionloss != 0.0),
-        ("armature", tendon.armature != 0.0),
-    ];
-    if let Some((name, _)) = constants.iter().find(|(_, acts)| *acts) {
-        return refuse(name);
-    }
-    if tendon.limited {
-        return refuse(if element.attr("limited").is_some() { "limited" } else { "range" });
-    }
-    for part in &element.children {
-        match part.name.as_str() {
-            "site" => names.sites.required(part, "site")?,
-            "geom" => names.geoms.required(part, "geom")?,
-            _ => 0,
-        };
-    }
-    Ok(())
-}
+/// Moment arms of every tendon in the reference configuration, as `(dof, coef)`.
+pub(crate) type Moments = Vec<Vec<(usize, f64)>>;
 
-/// Refuses a reference to a tendon that runs through sites.
-pub(crate) fn require_fixed(element: &Element, attribute: &str, tendon: &Tendon) -> Result<(), MjcfError> {
-    match tendon.kind {
-        TendonKind::Fixed(_) => Ok(()),
-        TendonKind::Spatial => {
-            let reason = format!("'{}' is a spatial tendon, and those are not simulated", tendon.name);
-            Err(element.unsupported(Some(attribute), reason))
-        }
-    }
-}
-
-/// The tendon's moment arms, as `(dof, coef)`; none for a string through sites.
-pub(crate) fn moments(model: &Model, tendon: &Tendon) -> Vec<(usize, f64)> {
-    match &tendon.kind {
+/// The moment arms of all tendons.
+pub(crate) fn moments(model: &Model, pose: &Pose) -> Moments {
+    let arms = |tendon: &Tendon| match &tendon.kind {
         TendonKind::Fixed(path) => path.iter().map(|(j, coef)| (model.joints[*j].dof_adr, *coef)).collect(),
-        TendonKind::Spatial => Vec::new(),
-    }
+        spatial => tendon_path::moments(model, pose, spatial),
+    };
+    model.tendons.iter().map(arms).collect()
 }

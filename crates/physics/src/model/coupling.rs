@@ -1,6 +1,6 @@
 //! Coupled degrees of freedom: tendons and equality constraints.
 
-use super::{Quat, SolImp, SolRef, Vec3};
+use super::{Model, Quat, SolImp, SolRef, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// Path of a tendon.
@@ -8,12 +8,88 @@ use serde::{Deserialize, Serialize};
 pub enum TendonKind {
     /// `length = sum(coef * qpos)` over hinge and slide joints, as `(joint, coef)`. A joint occurs once.
     Fixed(Vec<(usize, f64)>),
-    /// A string through sites and around geoms. The loader only accepts those that exert no force. Their `length0`,
-    /// `spring_length` and `invweight0` are 0, unlike MuJoCo's.
-    Spatial,
+    /// A string through sites and around geoms. Its length is that of all [spans](TendonKind::spans), m.
+    Spatial(Vec<PathPart>),
 }
 
-/// A tendon (MuJoCo `tendon_*`). Its length is in the units of the joints (m, rad or a mix) times the coefficients.
+/// A part of the path of a spatial tendon.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum PathPart {
+    /// A site that the string passes through.
+    Site(usize),
+    /// A sphere or cylinder that the string wraps around between the sites before and after it.
+    Geom {
+        /// The geom.
+        geom: usize,
+        /// The site that the string stays next to, if any. The string passes inside the geom if the site is inside.
+        side: Option<usize>,
+    },
+    /// The end of one branch of the path and the start of the next.
+    Pulley {
+        /// Divisor of the lengths of the branch behind it.
+        divisor: f64,
+    },
+}
+
+/// A piece of a spatial tendon from one site to the next, and the wrapped geom between them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathSpan {
+    /// The two sites.
+    pub sites: [usize; 2],
+    /// The geom to wrap around and its side site, if any.
+    pub wrap: Option<(usize, Option<usize>)>,
+    /// Divisor of its length.
+    pub divisor: f64,
+}
+
+impl TendonKind {
+    /// The pieces of a spatial tendon; none for a fixed one.
+    pub fn spans(&self) -> Vec<PathSpan> {
+        let TendonKind::Spatial(path) = self else { return Vec::new() };
+        let (mut from, mut wrap, mut divisor) = (None, None, 1.0);
+        let mut spans = Vec::new();
+        for part in path {
+            match *part {
+                PathPart::Site(site) => {
+                    if let Some(from) = from.replace(site) {
+                        spans.push(PathSpan { sites: [from, site], wrap: wrap.take(), divisor });
+                    }
+                }
+                PathPart::Geom { geom, side } => wrap = Some((geom, side)),
+                PathPart::Pulley { divisor: by } => (from, wrap, divisor) = (None, None, by),
+            }
+        }
+        spans
+    }
+}
+
+impl Model {
+    /// Degrees of freedom that move a body, from the body to the root.
+    pub(crate) fn dofs_of_body(&self, body: usize) -> Vec<usize> {
+        let weld = &self.bodies[self.bodies[body].weld_id];
+        let mut next = (weld.dof_count > 0).then(|| weld.dof_start + weld.dof_count - 1);
+        let mut dofs = Vec::new();
+        while let Some(dof) = next {
+            dofs.push(dof);
+            next = self.dofs[dof].parent;
+        }
+        dofs
+    }
+
+    /// Degrees of freedom that move the first of two bodies only, and the second only.
+    pub(crate) fn dofs_between(&self, bodies: [usize; 2]) -> [Vec<usize>; 2] {
+        let [mut first, mut second] = bodies.map(|b| self.dofs_of_body(b));
+        // those that move both are nearest to the root
+        while first.last().is_some_and(|dof| second.last() == Some(dof)) {
+            first.pop();
+            second.pop();
+        }
+        [first, second]
+    }
+}
+
+/// A tendon (MuJoCo `tendon_*`). The length of a fixed one is in the units of the joints (m, rad or a mix) times the
+/// coefficients.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Tendon {
     /// Name; empty when the file gives none.

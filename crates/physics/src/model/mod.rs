@@ -16,7 +16,7 @@ pub(crate) mod vector;
 mod view;
 
 pub use actuator::{Actuator, Dynamics, Transmission};
-pub use coupling::{Equality, EqualityKind, Tendon, TendonKind};
+pub use coupling::{Equality, EqualityKind, PathPart, PathSpan, Tendon, TendonKind};
 pub use hull::Hull;
 pub use sensor::{Sensor, SensorObject, SensorType};
 pub use shape::{Geom, GeomType, HField, Mesh, Pair, Site};

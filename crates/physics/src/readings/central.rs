@@ -224,6 +224,16 @@ impl<T: Real> Kernel<T> for Wrenches<'_, T> {
                 }
             }
         }
+        for string in readings.string_forces() {
+            for (side, body) in string.bodies.into_iter().enumerate() {
+                if body != 0 {
+                    let root = &sim.coms[sim.model.bodies[body].root_id];
+                    let arm = readings.arm_from(root, string.trees[side], &string.points[side]);
+                    let force = (&string.force, &[T::zero(); 3]);
+                    readings.add_wrench(body, &arm, force, (side == 1, string.on), &mut out);
+                }
+            }
+        }
         for (body, push) in group.xfrc_applied.iter().enumerate().skip(1) {
             let root = &sim.coms[sim.model.bodies[body].root_id];
             let arm = readings.separation(root, &sim.coms[body]);
@@ -251,9 +261,8 @@ impl<T: Real> Kernel<T> for Actuation<'_, T> {
                 }
                 TransmissionSpec::Tendon { index, gear } => {
                     let pull = *force * T::splat(*gear);
-                    for term in &sim.tendons[*index].terms {
-                        work.readings.qfrc_actuator[term.dof] =
-                            pull.mul_add(T::splat(term.coef), work.readings.qfrc_actuator[term.dof]);
+                    for (dof, arm) in sim.tendons[*index].arms(&work.forces.tendon_moments) {
+                        work.readings.qfrc_actuator[dof] = pull.mul_add(arm, work.readings.qfrc_actuator[dof]);
                     }
                 }
             }

@@ -95,9 +95,6 @@ impl<T: Real> Readings<'_, T> {
             }
         }
         for (t, tendon) in m.tendons.iter().enumerate() {
-            if tendon.kind == TendonKind::Spatial {
-                continue;
-            }
             // slack between the two lengths
             let length = self.tendon_length(t);
             let [low, high] = tendon.spring_length;

@@ -149,7 +149,7 @@ impl<T: Real> Readings<'_, T> {
 
     /// Force and torque on a site's body from its parent, about the site and in its axes (MuJoCo's `cfrc_int`). They
     /// are what the motion of the body and all bodies below it needs, minus the forces of contacts, connect and weld
-    /// constraints and pushes. `None` for sites of the world, which has no parent.
+    /// constraints, spatial tendons and pushes. `None` for sites of the world, which has no parent.
     #[inline(always)]
     pub(super) fn interaction(&self, site: usize) -> Option<(V3<T>, V3<T>)> {
         let m = &self.sim.model;
@@ -183,6 +183,16 @@ impl<T: Real> Readings<'_, T> {
             }
             if second {
                 sum.subtract(&self.separation(mount, &t.points[1]), &t.force, &t.torque, all);
+            }
+        }
+        for s in self.string_forces() {
+            let [first, second] = s.bodies.map(|b| inside[b]);
+            let arm = |i: usize| self.arm_from(mount, s.trees[i], &s.points[i]);
+            if first {
+                sum.add(&arm(0), &s.force, &[T::zero(); 3], s.on);
+            }
+            if second {
+                sum.subtract(&arm(1), &s.force, &[T::zero(); 3], s.on);
             }
         }
         let axes = self.work.motion.axes(mount);

@@ -15,9 +15,12 @@ pub(super) struct LimitReading<T> {
 }
 
 impl<T: Real> Readings<'_, T> {
-    /// Length of a fixed tendon.
+    /// Length of a tendon.
     #[inline(always)]
     pub(super) fn tendon_length(&self, tendon: usize) -> T {
+        if self.sim.tendons[tendon].spatial {
+            return self.work.strings.length[tendon];
+        }
         let mut sum = T::zero();
         if let TendonKind::Fixed(terms) = &self.sim.model.tendons[tendon].kind {
             for (joint, coef) in terms {
@@ -27,9 +30,12 @@ impl<T: Real> Readings<'_, T> {
         sum
     }
 
-    /// Rate of change of a fixed tendon's length.
+    /// Rate of change of a tendon's length.
     #[inline(always)]
     pub(super) fn tendon_velocity(&self, tendon: usize) -> T {
+        if self.sim.tendons[tendon].spatial {
+            return self.work.strings.velocity[tendon];
+        }
         let mut sum = T::zero();
         if let TendonKind::Fixed(terms) = &self.sim.model.tendons[tendon].kind {
             for (joint, coef) in terms {
@@ -85,11 +91,22 @@ impl<T: Real> Readings<'_, T> {
         }
         let mut sum = T::zero();
         for (i, a) in m.actuators.iter().enumerate() {
+            if let Transmission::Tendon(t) = a.transmission
+                && self.sim.tendons[t].spatial
+            {
+                let force = self.work.forces.actuator_force[i] * T::lit(a.gear[0]);
+                for (dof, arm) in self.sim.tendons[t].arms(&self.work.forces.tendon_moments) {
+                    if dof == one.dof_adr {
+                        sum = arm.mul_add(force, sum);
+                    }
+                }
+                continue;
+            }
             let lever = match a.transmission {
                 Transmission::Joint(j) | Transmission::JointInParent(j) => f64::from(j == joint),
                 Transmission::Tendon(t) => match &m.tendons[t].kind {
                     TendonKind::Fixed(terms) => terms.iter().find(|(j, _)| *j == joint).map_or(0.0, |(_, c)| *c),
-                    TendonKind::Spatial => 0.0,
+                    TendonKind::Spatial(_) => 0.0,
                 },
             };
             if lever != 0.0 {
@@ -153,7 +170,7 @@ impl<T: Real> Readings<'_, T> {
         LimitReading {
             pos: T::masked(on, rest - margin),
             vel: T::masked(on, -rate),
-            force: self.limit_force(Source::BallLimit(one.dof_adr)),
+            force: self.limit_force(|s| s == Source::BallLimit(one.dof_adr)),
         }
     }
 
@@ -169,15 +186,16 @@ impl<T: Real> Readings<'_, T> {
         let length = self.tendon_length(tendon);
         let (low, high) = (length - T::lit(t.range[0]), T::lit(t.range[1]) - length);
         let (pos, vel) = reached(low, high, T::lit(t.margin), self.tendon_velocity(tendon));
-        LimitReading { pos, vel, force: self.limit_force(Source::TendonLimit(tendon)) }
+        let own = |s| matches!(s, Source::TendonLimit { tendon: t, .. } if t == tendon);
+        LimitReading { pos, vel, force: self.limit_force(own) }
     }
 
     /// Force of the first row that a limit has in a lane.
     #[inline(always)]
-    fn limit_force(&self, source: Source) -> T {
+    fn limit_force(&self, own: impl Fn(Source) -> bool) -> T {
         let mut force = T::zero();
         let mut left = T::not(T::none());
-        for block in self.work.rows.blocks.iter().filter(|b| b.source == source) {
+        for block in self.work.rows.blocks.iter().filter(|b| own(b.source)) {
             force = T::select(T::and(left, block.on), block.force[0], force);
             left = T::and(left, T::not(block.on));
         }

@@ -15,6 +15,7 @@ mod measure;
 mod ray;
 mod rays;
 mod sensors;
+mod strings;
 mod touch;
 
 pub use measure::MeasurePlan;

@@ -19,12 +19,12 @@ pub(crate) enum Source {
     Contacts,
     /// An equality constraint, by index in the model.
     Equality(usize),
-    /// A limit of a tendon.
-    TendonLimit(usize),
+    /// A limit of a tendon: the upper one, or the lower one.
+    TendonLimit { tendon: usize, upper: bool },
     /// The limit of the ball joint with this first degree of freedom.
     BallLimit(usize),
     /// Dry friction of a tendon.
-    TendonFriction,
+    TendonFriction(usize),
 }
 
 /// A constraint of up to six rows.

@@ -93,3 +93,27 @@ pub(super) fn joint_force_ranges<T: Real>(model: &Model) -> Vec<(usize, T::Scala
     };
     model.joints.iter().filter_map(bounded).collect()
 }
+
+/// Bounds of the total actuator force on a tendon.
+#[derive(Clone, Debug)]
+pub(crate) struct TendonForceRange<C> {
+    pub tendon: usize,
+    pub low: C,
+    pub high: C,
+    /// The actuators that pull it.
+    pub actuators: Vec<usize>,
+}
+
+/// Bounds of the total actuator forces on tendons, for those that have any.
+pub(super) fn tendon_force_ranges<T: Real>(model: &Model) -> Vec<TendonForceRange<T::Scalar>> {
+    if !model.opt.flags.actuation {
+        return Vec::new();
+    }
+    let bounded = |(tendon, t): (usize, &crate::model::Tendon)| {
+        let pulls = |(_, a): &(usize, &Actuator)| a.transmission == Transmission::Tendon(tendon);
+        let actuators: Vec<usize> = model.actuators.iter().enumerate().filter(pulls).map(|(i, _)| i).collect();
+        let [low, high] = t.actuator_force_range.filter(|_| !actuators.is_empty())?.map(T::scalar);
+        Some(TendonForceRange { tendon, low, high, actuators })
+    };
+    model.tendons.iter().enumerate().filter_map(bounded).collect()
+}

@@ -44,6 +44,8 @@ pub(crate) struct Frames<C> {
 #[derive(Clone, Debug)]
 pub(crate) struct Length<C> {
     pub terms: Vec<Term<C>>,
+    /// The tendon, if it is a string: then there are no terms.
+    pub string: Option<usize>,
     pub zero: C,
 }
 
@@ -58,9 +60,13 @@ pub(super) fn equalities<T: Real>(
     let joint = |j: usize| {
         let j = &model.joints[j];
         let term = Term { qpos: j.qpos_adr, dof: j.dof_adr, coef: c(1.0) };
-        Length { terms: vec![term], zero: c(model.qpos0[j.qpos_adr]) }
+        Length { terms: vec![term], string: None, zero: c(model.qpos0[j.qpos_adr]) }
     };
-    let tendon = |t: usize| Length { terms: tendons[t].terms.clone(), zero: c(model.tendons[t].length0) };
+    let tendon = |t: usize| Length {
+        terms: tendons[t].terms.clone(),
+        string: tendons[t].spatial.then_some(t),
+        zero: c(model.tendons[t].length0),
+    };
     let mut out = Vec::new();
     if !(model.opt.flags.equality && model.opt.flags.constraint) {
         return out;

@@ -19,12 +19,14 @@ mod no_slip;
 mod options;
 mod pairs;
 mod softness;
+mod string;
 mod tendon;
+mod tree_matrix;
 mod unsupported;
 mod weights;
 mod weld;
 
-pub(crate) use actuator::{Activation, ActuatorSpec, TransmissionSpec};
+pub(crate) use actuator::{Activation, ActuatorSpec, TendonForceRange, TransmissionSpec};
 pub(crate) use broad::Broad;
 pub(crate) use caps::Caps;
 pub(crate) use contacts::Contacts;
@@ -37,7 +39,9 @@ pub(crate) use options::MOST_COUPLED_ROWS;
 pub use options::{SimError, SimOptions};
 pub(crate) use pairs::{Cull, GeomPair, GeomPairOf, PairSpec, ShapePair};
 pub(crate) use softness::{Cost, Softness, impedance, impedance_at};
+pub(crate) use string::{Around, Lever, Span, Spot, StringSpec};
 pub(crate) use tendon::TendonSpec;
+pub(crate) use tree_matrix::TreeMatrix;
 
 use crate::geometry::convex::{MOST_ITERATIONS, Polyhedron, Search};
 use crate::geometry::height::HeightField;
@@ -67,8 +71,14 @@ pub struct Sim<T: Real> {
     pub(crate) actuators: Vec<ActuatorSpec<T::Scalar>>,
     /// Bounds of the total actuator force on a degree of freedom.
     pub(crate) joint_force_ranges: Vec<(usize, T::Scalar, T::Scalar)>,
+    /// Bounds of the total actuator force on a tendon.
+    pub(crate) tendon_force_ranges: Vec<TendonForceRange<T::Scalar>>,
     pub(crate) equalities: Vec<EqualitySpec<T::Scalar>>,
     pub(crate) tendons: Vec<TendonSpec<T::Scalar>>,
+    /// The paths of spatial tendons.
+    pub(crate) strings: Vec<StringSpec<T::Scalar>>,
+    /// The matrix of `implicitfast`, if tendons have a share in it.
+    pub(crate) damped_tendons: Option<TreeMatrix>,
     pub(crate) ball_limits: Vec<BallLimit<T::Scalar>>,
     pub(crate) gravcomp: Vec<GravComp<T::Scalar>>,
     pub(crate) drags: Vec<Drag<T::Scalar>>,
@@ -124,6 +134,9 @@ impl<T: Real> Sim<T> {
         let dof_link: Vec<usize> =
             model.dofs.iter().map(|d| link_of[d.body].expect("dofs belong to moving bodies")).collect();
         let tree_of: Vec<usize> = links.iter().map(|l| l.tree).collect();
+        let geoms: Vec<_> = model.geoms.iter().enumerate().map(|(i, g)| mount(g.body, model.geom_frame(i))).collect();
+        let sites: Vec<_> = model.sites.iter().enumerate().map(|(i, s)| mount(s.body, model.site_frame(i))).collect();
+        let strings = string::strings::<T>(model, &string::Mounts { sites: &sites, geoms: &geoms, trees: &tree_of });
         let contacts = contacts::contacts::<T>(model, &mounts, &link_of, &tree_of, &options)?;
         let damped = flags.damper && model.dofs.iter().any(|d| d.damping != 0.0);
         let implicit_fast = model.opt.integrator == Integrator::ImplicitFast;
@@ -144,8 +157,11 @@ impl<T: Real> Sim<T> {
             ball_limits: limit::ball_limits::<T>(model),
             actuators: actuator::actuators::<T>(model),
             joint_force_ranges: actuator::joint_force_ranges::<T>(model),
+            tendon_force_ranges: actuator::tendon_force_ranges::<T>(model),
             equalities,
             tendons,
+            strings,
+            damped_tendons: TreeMatrix::of_damped_tendons(model),
             gravcomp: medium::gravity_compensation::<T>(model, &mounts, &link_of),
             drags: medium::drags::<T>(model, &mounts, &link_of),
             wind: model.opt.wind.map(c),
@@ -159,8 +175,8 @@ impl<T: Real> Sim<T> {
             },
             bodies: bodies().map(|b| mount(b, ([0.0; 3], [1.0, 0.0, 0.0, 0.0]))).collect(),
             coms: bodies().map(|b| mount(b, model.inertial_frame(b))).collect(),
-            geoms: model.geoms.iter().enumerate().map(|(i, g)| mount(g.body, model.geom_frame(i))).collect(),
-            sites: model.sites.iter().enumerate().map(|(i, s)| mount(s.body, model.site_frame(i))).collect(),
+            geoms,
+            sites,
             dt: c(model.opt.timestep),
             gravity: gravity.map(c),
             rk4,

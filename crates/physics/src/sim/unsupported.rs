@@ -1,7 +1,7 @@
 //! Refuses by name what the kernels do not support.
 
 use super::options::SimError;
-use crate::model::{Actuator, Body, Integrator, Joint, JointType, Model, Tendon, TendonKind, Transmission};
+use crate::model::{Actuator, Body, Integrator, Joint, JointType, Model, Tendon, Transmission};
 
 /// Refuses a model that would not be simulated as in MuJoCo. Contacts are checked when their list is created.
 pub(crate) fn check(model: &Model) -> Result<(), SimError> {
@@ -10,7 +10,7 @@ pub(crate) fn check(model: &Model) -> Result<(), SimError> {
     };
     let found = options(model)
         .or_else(|| model.bodies.iter().find_map(|b| body(model, b)))
-        .or_else(|| model.tendons.iter().find_map(|t| tendon(model, t)))
+        .or_else(|| model.tendons.iter().find_map(tendon))
         .or_else(|| model.actuators.iter().find_map(|a| actuator(model, a)));
     found.map_or(Ok(()), refuse)
 }
@@ -57,19 +57,13 @@ fn joint(model: &Model, body: &Body, siblings: &[Joint], i: usize, joint: &Joint
     None
 }
 
-fn tendon(model: &Model, tendon: &Tendon) -> Refusal {
+fn tendon(tendon: &Tendon) -> Refusal {
     let name = &tendon.name;
     if tendon.stiffness_poly != [0.0; 2] || tendon.damping_poly != [0.0; 2] {
         return Some((format!("polynomial stiffness or damping of tendon '{name}'"), "use the linear term"));
     }
     if tendon.armature != 0.0 {
         return Some((format!("armature of tendon '{name}'"), "give the joints armature"));
-    }
-    if tendon.actuator_force_range.is_some() {
-        return Some((format!("actuatorfrcrange of tendon '{name}'"), "use the actuators' forcerange"));
-    }
-    if tendon.damping != 0.0 && model.opt.integrator == Integrator::ImplicitFast {
-        return Some((format!("damping of tendon '{name}' with integrator ImplicitFast"), "use Euler or RK4"));
     }
     None
 }
@@ -78,16 +72,7 @@ fn actuator(model: &Model, a: &Actuator) -> Refusal {
     let name = &a.name;
     let affine = a.gain[1..] != [0.0; 2] || a.bias[1..] != [0.0; 2];
     match a.transmission {
-        Transmission::Tendon(t) => {
-            if model.tendons[t].kind == TendonKind::Spatial {
-                return Some((format!("the spatial tendon of actuator '{name}'"), "use a fixed tendon"));
-            }
-            let by_velocity = a.gain[2] != 0.0 || a.bias[2] != 0.0;
-            if by_velocity && model.opt.integrator == Integrator::ImplicitFast {
-                let what = format!("velocity feedback of actuator '{name}' on a tendon with integrator ImplicitFast");
-                return Some((what, "use Euler or RK4"));
-            }
-        }
+        Transmission::Tendon(_) => {}
         Transmission::Joint(j) | Transmission::JointInParent(j) => {
             let joint = &model.joints[j];
             let scalar = matches!(joint.kind, JointType::Hinge | JointType::Slide);

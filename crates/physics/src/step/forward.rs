@@ -130,7 +130,7 @@ impl<T: Real> Sim<T> {
     }
 
     fn smooth(&self, work: &mut Work<T>, group: &Group<T>) {
-        motion(self, group, work);
+        self.refresh(work, group);
         joint_forces(self, group, work);
         work.forces.link_applied.clear();
         if !self.gravcomp.is_empty() || !self.drags.is_empty() || !group.xfrc_applied.is_empty() {
@@ -166,6 +166,9 @@ impl<T: Real> Sim<T> {
     /// Recomputes positions and velocities of bodies at the current state.
     pub fn refresh(&self, work: &mut Work<T>, group: &Group<T>) {
         motion(self, group, work);
+        if !self.strings.is_empty() {
+            measure_strings(self, group, work);
+        }
     }
 
     /// Like [`Sim::refresh`], including the forces of the actuators.

@@ -2,6 +2,7 @@
 //! every velocity-dependent actuator force.
 
 use super::euler::integrate;
+use super::implicit_tendons::implicit_tendons;
 use crate::algebra::planar::{Full, Planar, Space};
 use crate::algebra::spatial::*;
 use crate::dynamics::{accelerate, bring_inward, factorize};
@@ -31,7 +32,9 @@ kernel_fn! {
 
 impl<T: Real> Sim<T> {
     pub(super) fn implicitfast(&self, work: &mut Work<T>, group: &mut Group<T>) {
-        if self.planar {
+        if let Some(matrix) = &self.damped_tendons {
+            implicit_tendons(self, work, matrix);
+        } else if self.planar {
             planar_implicit_acceleration(self, work);
         } else {
             implicit_acceleration(self, work);

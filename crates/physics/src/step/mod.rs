@@ -1,8 +1,9 @@
 //! One step, with MuJoCo's names for its stages: [`forward`] computes the acceleration, and an integrator ([`euler`],
-//! [`implicitfast`], [`rk4`]) advances the state.
+//! [`implicitfast`], [`rk4`]) advances the state. [`implicit_tendons`] is the part of `implicitfast` for tendons.
 
 mod euler;
 mod forward;
+mod implicit_tendons;
 mod implicitfast;
 mod rk4;
 

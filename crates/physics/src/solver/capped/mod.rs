@@ -46,6 +46,8 @@ fn iterate<T: Real, S: Space>(sim: &Sim<T>, caps: &Caps, group: &Group<T>, work:
     let rows = &work.rows;
     if rows.contacts.is_empty() && rows.limits.is_empty() && rows.dry.is_empty() && rows.blocks.is_empty() {
         work.solver.qacc.copy_from_slice(&c.smooth);
+        // what is left of the forces, for the integrator
+        c.gradient.fill(T::zero());
         return;
     }
     islands::find(sim, work, c);

@@ -18,6 +18,12 @@ pub(crate) struct Forces<T: Real> {
     pub act_dot: Vec<T>,
     pub tendon_length: Vec<T>,
     pub tendon_velocity: Vec<T>,
+    /// Moment arms of the strings at the last evaluation of the forces, one string after the other.
+    pub tendon_moments: Vec<T>,
+    /// Negative derivative of each tendon's force with respect to its velocity, with `implicitfast`.
+    pub minus_tendon_deriv: Vec<T>,
+    /// Factors of the actuator forces on each tendon and of their derivatives: not 1 if the sum is out of bounds.
+    pub tendon_share: Vec<[T; 2]>,
     /// External torque and force on every link: gravity compensation, fluid, and pushes (`xfrc_applied`). Empty for
     /// none.
     pub link_applied: Vec<V6<T>>,
@@ -36,6 +42,9 @@ impl<T: Real> Forces<T> {
             act_dot: vec![z; sim.model.na],
             tendon_length: vec![z; sim.tendons.len()],
             tendon_velocity: vec![z; sim.tendons.len()],
+            tendon_moments: vec![z; sim.tendons.iter().map(|t| t.dofs.len()).sum()],
+            minus_tendon_deriv: vec![z; sim.tendons.len()],
+            tendon_share: vec![[T::lit(1.0); 2]; sim.tendons.len()],
             link_applied: Vec::with_capacity(nl),
             actuator_force: vec![z; sim.model.nu],
         }

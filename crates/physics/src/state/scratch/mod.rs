@@ -9,6 +9,7 @@ mod readings;
 mod rk4;
 mod slip;
 mod solver;
+mod strings;
 
 pub(crate) use capped::Capped;
 pub(crate) use contacts::GeomContacts;
@@ -19,6 +20,7 @@ pub(crate) use readings::Measured;
 pub(crate) use rk4::Rk4;
 pub(crate) use slip::{Law, MOST_ROWS, Patch, Place, Slip, SlipLane};
 pub(crate) use solver::Solver;
+pub(crate) use strings::{DampedTendons, Strings};
 
 use super::stats::SolverStats;
 use crate::algebra::spatial::V6;
@@ -33,6 +35,8 @@ pub struct Work<T: Real> {
     /// Per degree of freedom.
     pub(crate) dofs: Vec<DofWork<T>>,
     pub(crate) forces: Forces<T>,
+    pub(crate) strings: Strings<T>,
+    pub(crate) damped_tendons: DampedTendons<T>,
     pub(crate) solver: Solver<T>,
     pub(crate) contacts: GeomContacts<T>,
     pub(crate) readings: Measured<T>,
@@ -58,6 +62,8 @@ impl<T: Real> Work<T> {
             motion: Motion::new(sim),
             dofs: vec![DofWork::new(); sim.model.nv],
             forces: Forces::new(sim),
+            strings: Strings::new(sim),
+            damped_tendons: DampedTendons::new(sim),
             solver: Solver::new(sim),
             contacts: GeomContacts::new(sim),
             readings: Measured::new(sim),

@@ -1,0 +1,71 @@
+//! The layout of a symmetric matrix with entries only between degrees of freedom of which one carries the other, like
+//! the mass matrix.
+
+use crate::model::same_frame::FRAME_EPS;
+use crate::model::{Integrator, JointType, Model, Transmission};
+use std::ops::Range;
+
+/// Row `d` has the entry of `d` itself, then those of the degrees of freedom that carry it, nearest first.
+#[derive(Clone, Debug)]
+pub(crate) struct TreeMatrix {
+    /// Start of each row.
+    pub start: Vec<usize>,
+    /// The nearest degree of freedom that carries each.
+    pub parent: Vec<Option<usize>>,
+    pub len: usize,
+    /// Entries of rows that MuJoCo keeps diagonal, see [`is_simple`].
+    pub dropped: Vec<Range<usize>>,
+    /// Tendons whose forces depend on their velocities.
+    pub tendons: Vec<usize>,
+}
+
+impl TreeMatrix {
+    /// The matrix that `implicitfast` solves with, for models in which tendons have a share in it.
+    pub fn of_damped_tendons(model: &Model) -> Option<TreeMatrix> {
+        if model.opt.integrator != Integrator::ImplicitFast {
+            return None;
+        }
+        let flags = &model.opt.flags;
+        let damped = |t: usize| flags.damper && model.tendons[t].damping != 0.0;
+        let fed_back = |t: usize| {
+            let mut pulls = model.actuators.iter().filter(|a| a.transmission == Transmission::Tendon(t));
+            flags.actuation && pulls.any(|a| a.gain[2] != 0.0 || a.bias[2] != 0.0)
+        };
+        let tendons: Vec<usize> = (0..model.tendons.len()).filter(|t| damped(*t) || fed_back(*t)).collect();
+        if tendons.is_empty() {
+            return None;
+        }
+        let parent: Vec<Option<usize>> = model.dofs.iter().map(|d| d.parent).collect();
+        let (mut start, mut depth, mut len) = (Vec::new(), Vec::new(), 0);
+        for p in &parent {
+            start.push(len);
+            let own: usize = 1 + p.map_or(0, |p: usize| depth[p]);
+            depth.push(own);
+            len += own;
+        }
+        let of_simple = |d: &usize| is_simple(model, model.dofs[*d].body);
+        let dropped = (0..parent.len()).filter(of_simple).map(|d| start[d] + 1..start[d] + depth[d]).collect();
+        Some(TreeMatrix { start, parent, len, dropped, tendons })
+    }
+}
+
+/// Whether the mass matrix of a body is diagonal by its structure (MuJoCo's `body_simple`): it has no children, stands
+/// on the world, and its joints are at its center of mass along its principal axes. Free bodies are solved separately.
+fn is_simple(model: &Model, index: usize) -> bool {
+    let body = &model.bodies[index];
+    let parent = &model.bodies[body.parent];
+    let small = |v: &[f64]| v.iter().all(|x| x.abs() < FRAME_EPS);
+    let aligned = |axis: [f64; 3]| axis.iter().filter(|x| x.abs() > 1e-14).count() == 1;
+    let joints = &model.joints[body.joint_start..body.joint_start + body.joint_count];
+    let turns = |kind: JointType| kind != JointType::Slide;
+    let last = joints.len().saturating_sub(1);
+    let fits = joints.iter().enumerate().all(|(i, j)| {
+        let straight = matches!(j.kind, JointType::Ball | JointType::Free) || aligned(j.axis);
+        small(&j.pos) && straight && (i == last || !turns(j.kind))
+    });
+    fits && joints.iter().all(|j| j.kind != JointType::Free)
+        && small(&body.ipos)
+        && small(&body.iquat[1..])
+        && (body.parent == 0 || (parent.parent == 0 && parent.dof_count == 0))
+        && model.bodies.get(index + 1).is_none_or(|next| next.parent != index)
+}
