@@ -6,7 +6,7 @@
 #   aarch64   the Python tests with the wheel for Arm, under qemu
 #   bits      states and weights with SSE2, under qemu with NEON, and with both WebAssembly modules
 #   web       the page in Chromium and Firefox, with five minutes of play
-#   soak      ten million steps of each agent
+#   soak      ten million steps of each agent, three hundred models with random meshes
 #   crates    packs and compiles the published crates
 #   player    twenty random players in the game, and four with a camera in each of five worlds, ten minutes of its time each
 set -euo pipefail
@@ -36,7 +36,10 @@ for part in "${parts[@]}"; do
       crates/wasm/test.sh --both
       ;;
     web) web/test.sh --long ;;
-    soak) MARATHON_TEST_LONG=yes cargo test --release -p marathon-physics --test ten_million_steps_stay_finite -- --nocapture ;;
+    soak)
+      MARATHON_TEST_LONG=yes cargo test --release -p marathon-physics --test ten_million_steps_stay_finite \
+        --test meshes_agree_with_mujoco -- --nocapture
+      ;;
     crates) release/publish.sh --dry-run ;;
     player)
       cargo test --release --workspace --test a_stranger_plays -- --ignored --nocapture

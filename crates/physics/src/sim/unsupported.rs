@@ -10,7 +10,7 @@ pub(crate) fn check(model: &Model) -> Result<(), SimError> {
     };
     let found = options(model)
         .or_else(|| model.bodies.iter().find_map(|b| body(model, b)))
-        .or_else(|| model.tendons.iter().find_map(tendon))
+        .or_else(|| model.tendons.iter().enumerate().find_map(tendon))
         .or_else(|| model.actuators.iter().find_map(|a| actuator(model, a)));
     found.map_or(Ok(()), refuse)
 }
@@ -57,13 +57,14 @@ fn joint(model: &Model, body: &Body, siblings: &[Joint], i: usize, joint: &Joint
     None
 }
 
-fn tendon(tendon: &Tendon) -> Refusal {
-    let name = &tendon.name;
+fn tendon((index, tendon): (usize, &Tendon)) -> Refusal {
+    // many tendons have no name
+    let name = if tendon.name.is_empty() { format!("number {index}") } else { format!("'{}'", tendon.name) };
     if tendon.stiffness_poly != [0.0; 2] || tendon.damping_poly != [0.0; 2] {
-        return Some((format!("polynomial stiffness or damping of tendon '{name}'"), "use the linear term"));
+        return Some((format!("polynomial stiffness or damping of tendon {name}"), "use the linear term"));
     }
     if tendon.armature != 0.0 {
-        return Some((format!("armature of tendon '{name}'"), "give the joints armature"));
+        return Some((format!("armature of tendon {name}"), "give the joints armature"));
     }
     None
 }
