@@ -15,7 +15,7 @@ use super::kind::Kind;
 use super::part::{Draft, set};
 use super::references::{self, Gone};
 
-/// Sections whose elements are copied. What others refer to comes before them.
+/// Sections whose elements are copied. Each refers to earlier ones only.
 const FOLLOWERS: [&str; 6] = ["contact", "tendon", "equality", "actuator", "sensor", "custom"];
 /// Parts of a body that cannot stand in a frame.
 const NOT_IN_FRAMES: [&str; 3] = ["joint", "freejoint", "inertial"];

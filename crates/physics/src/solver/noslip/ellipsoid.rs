@@ -1,6 +1,6 @@
 //! The friction force of a contact with an elliptic cone and a fixed normal force.
 
-use super::sweep::LEAST;
+use crate::model::vector::MIN_VAL;
 use crate::state::MOST_ROWS;
 
 /// Change of the multiplier, excess of the squared force, and determinants and pivots below which MuJoCo stops.
@@ -48,7 +48,7 @@ pub(super) fn minimize(a: &Matrix, b: &Vector, mu: &Vector, r: f64, n: usize) ->
         square += out[i] * out[i] / (mu[i] * mu[i]);
     }
     if multiplier != 0.0 {
-        let onto = (r * r / square.max(LEAST)).sqrt();
+        let onto = (r * r / square.max(MIN_VAL)).sqrt();
         out.iter_mut().take(n).for_each(|x| *x *= onto);
     }
     out

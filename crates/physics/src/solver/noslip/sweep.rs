@@ -1,11 +1,10 @@
 //! Gauss-Seidel sweeps over the friction rows of a lane, in MuJoCo's order and with its rule to stop.
 
 use super::ellipsoid::{dot, minimize};
+use crate::model::vector::MIN_VAL;
 use crate::sim::NoSlip;
 use crate::state::{Law, MOST_ROWS, Patch, SlipLane};
 
-/// Least number that MuJoCo divides by (`mjMINVAL`).
-pub(super) const LEAST: f64 = 1e-15;
 /// Least response of a row of an ellipsoid, and the largest increase of the cost that is not taken back.
 const TINY: f64 = 1e-10;
 
@@ -65,7 +64,7 @@ fn push(p: &Patch, lane: &mut SlipLane, k: usize, by: f64) {
 
 /// Updates dry friction. Returns the improvement of the cost.
 fn dry(p: &mut Patch, lane: &mut SlipLane) -> f64 {
-    let (r, response, old) = (residual(p, lane, 0), p.matrix[0][0].max(LEAST), p.force[0]);
+    let (r, response, old) = (residual(p, lane, 0), p.matrix[0][0].max(MIN_VAL), p.force[0]);
     p.force[0] = (old - r / response).max(-p.bound[0]).min(p.bound[0]);
     let by = p.force[0] - old;
     push(p, lane, 0, by);
@@ -81,7 +80,7 @@ fn pyramid(p: &mut Patch, lane: &mut SlipLane) -> f64 {
         let (slope, curvature) = (lever * residual(p, lane, k), lever * lever * p.matrix[k][k]);
         let least = old - slope / curvature;
         // nothing moves along this tangent
-        let new = if curvature < LEAST { 0.0 } else { least.max(-p.bound[k]).min(p.bound[k]) };
+        let new = if curvature < MIN_VAL { 0.0 } else { least.max(-p.bound[k]).min(p.bound[k]) };
         let by = new - old;
         let rise = 0.5 * by * by * curvature + by * slope;
         if rise > TINY {
@@ -106,7 +105,7 @@ fn ellipsoid(p: &mut Patch, lane: &mut SlipLane) -> f64 {
         rest[k] -= dot(&matrix[k], &p.force, n);
     }
     let normal = p.bound[0];
-    let new = if normal < LEAST { [0.0; MOST_ROWS] } else { minimize(&matrix, &rest, &p.mu, normal, n) };
+    let new = if normal < MIN_VAL { [0.0; MOST_ROWS] } else { minimize(&matrix, &rest, &p.mu, normal, n) };
     let mut by = [0.0; MOST_ROWS];
     for k in 0..n {
         by[k] = new[k] - p.force[k];
