@@ -9,7 +9,7 @@ use super::pose::{Motion, Pose, motion};
 use super::room::Room;
 use super::tendon::Moments;
 use crate::budget::OverBudget;
-use crate::model::same_frame::FRAME_EPS;
+use crate::model::same_frame::small;
 use crate::model::{JointType, Model, Tendon, Vec3};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -126,17 +126,12 @@ pub(crate) fn tendon_inverse_weights(model: &mut Model, mass: &MassMatrix, momen
 /// MuJoCo does not look further up: on a static body that is deeper, or on one that is welded to it, the rule does not hold.
 fn is_lone_slider(model: &Model, index: usize, heavy: &HeavyTendons) -> bool {
     let body = &model.bodies[index];
-    let parent = &model.bodies[body.parent];
-    let small = |v: &[f64], eps: f64| v.iter().all(|x| x.abs() < eps);
     let aligned = |axis: Vec3| axis.iter().filter(|x| x.abs() > EPS).count() == 1;
     let joints = &model.joints[body.joint_start..body.joint_start + body.joint_count];
     !joints.is_empty()
         && !joints.iter().any(|j| heavy.by_dof.contains_key(&j.dof_adr))
-        && joints.iter().all(|j| j.kind == JointType::Slide && small(&j.pos, FRAME_EPS) && aligned(j.axis))
-        && small(&body.ipos, FRAME_EPS)
-        && small(&body.iquat[1..], FRAME_EPS)
-        && (body.parent == 0 || (parent.parent == 0 && parent.dof_count == 0))
-        && model.bodies.get(index + 1).is_none_or(|next| next.parent != index)
+        && joints.iter().all(|j| j.kind == JointType::Slide && small(j.pos) && aligned(j.axis))
+        && model.stands_alone(index)
 }
 
 /// Tendons with inertia, by the dofs that they pull.

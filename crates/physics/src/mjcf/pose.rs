@@ -13,13 +13,7 @@ pub(crate) struct Pose {
 
 impl Pose {
     pub fn new(model: &Model) -> Self {
-        let mut body: Vec<Frame> = Vec::with_capacity(model.bodies.len());
-        for (i, b) in model.bodies.iter().enumerate() {
-            let own = Frame { pos: b.pos, quat: b.quat };
-            body.push(if i == 0 { own } else { body[b.parent].compose(&own) });
-        }
-        let com = body.iter().enumerate().map(|(i, frame)| frame.point(model.inertial_frame(i).0)).collect();
-        Pose { body, com }
+        Pose::at(model, &model.qpos0)
     }
 
     /// World poses in another configuration of the hinges and slides.
@@ -31,6 +25,7 @@ impl Pose {
             for joint in &model.joints[b.joint_start..b.joint_start + b.joint_count] {
                 let away = qpos[joint.qpos_adr] - model.qpos0[joint.qpos_adr];
                 match joint.kind {
+                    _ if away == 0.0 => {}
                     JointType::Slide => frame.pos = add(frame.pos, scale(rotate(frame.quat, joint.axis), away)),
                     JointType::Hinge => {
                         let anchor = frame.point(joint.pos);

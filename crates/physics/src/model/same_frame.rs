@@ -1,13 +1,13 @@
 //! Frames of centers of mass, geoms and sites as MuJoCo's kinematics takes them (`mjtSameFrame`, set by its compiler).
 //!
-//! A frame that differs from its body's frame or from the body's inertial frame by less than a millionth, in meters and in entries of
-//! the quaternion, counts as that frame. Geoms of meshes come this close: the center of a symmetric mesh is not exactly zero.
+//! A frame that is almost its body's frame, or almost the body's inertial frame, counts as that frame. Almost means less than a
+//! millionth, in meters and in entries of the quaternion. Geoms of meshes come this close: the center of a symmetric mesh is not exactly zero.
 
 use super::vector::{cross, scale, sub};
 use super::{Model, Quat, Vec3};
 
 /// Frames closer than this count as equal; MuJoCo's `kFrameEps`.
-pub(crate) const FRAME_EPS: f64 = 1e-6;
+const FRAME_EPS: f64 = 1e-6;
 
 const IDENTITY: Quat = [1.0, 0.0, 0.0, 0.0];
 
@@ -30,6 +30,16 @@ impl Model {
         self.frame_on(site.body, site.pos, site.quat)
     }
 
+    /// Whether a body's place in the tree allows MuJoCo to take its mass matrix for diagonal: it has no children, hangs on the world or
+    /// on a static child of it, and its center of mass is in its own frame.
+    pub(crate) fn stands_alone(&self, body: usize) -> bool {
+        let own = &self.bodies[body];
+        let parent = &self.bodies[own.parent];
+        near_body(own.ipos, own.iquat) == Some(([0.0; 3], IDENTITY))
+            && (own.parent == 0 || (parent.parent == 0 && parent.dof_count == 0))
+            && self.bodies.get(body + 1).is_none_or(|next| next.parent != body)
+    }
+
     fn frame_on(&self, body: usize, pos: Vec3, quat: Quat) -> (Vec3, Quat) {
         if let Some(frame) = near_body(pos, quat) {
             return frame;
@@ -49,7 +59,8 @@ fn near_body(pos: Vec3, quat: Quat) -> Option<(Vec3, Quat)> {
     small([x, y, z]).then_some((if small(pos) { [0.0; 3] } else { pos }, IDENTITY))
 }
 
-fn small(v: Vec3) -> bool {
+/// Whether a vector or rotation counts as zero.
+pub(crate) fn small(v: Vec3) -> bool {
     v.iter().all(|x| x.abs() < FRAME_EPS)
 }
 

@@ -1,7 +1,7 @@
 //! The layout of a symmetric matrix with entries only between degrees of freedom of which one carries the other, like
 //! the mass matrix.
 
-use crate::model::same_frame::FRAME_EPS;
+use crate::model::same_frame::small;
 use crate::model::{Integrator, JointType, Model, Transmission};
 use std::ops::Range;
 
@@ -49,23 +49,17 @@ impl TreeMatrix {
     }
 }
 
-/// Whether the mass matrix of a body is diagonal by its structure (MuJoCo's `body_simple`): it has no children, stands
-/// on the world, and its joints are at its center of mass along its principal axes. Free bodies are solved separately.
+/// Whether the mass matrix of a body is diagonal by its structure (MuJoCo's `body_simple`). Such a body stands alone, and its
+/// joints are at its center of mass along its principal axes. Free bodies are solved separately.
 fn is_simple(model: &Model, index: usize) -> bool {
     let body = &model.bodies[index];
-    let parent = &model.bodies[body.parent];
-    let small = |v: &[f64]| v.iter().all(|x| x.abs() < FRAME_EPS);
     let aligned = |axis: [f64; 3]| axis.iter().filter(|x| x.abs() > 1e-14).count() == 1;
     let joints = &model.joints[body.joint_start..body.joint_start + body.joint_count];
     let turns = |kind: JointType| kind != JointType::Slide;
     let last = joints.len().saturating_sub(1);
     let fits = joints.iter().enumerate().all(|(i, j)| {
         let straight = matches!(j.kind, JointType::Ball | JointType::Free) || aligned(j.axis);
-        small(&j.pos) && straight && (i == last || !turns(j.kind))
+        small(j.pos) && straight && (i == last || !turns(j.kind))
     });
-    fits && joints.iter().all(|j| j.kind != JointType::Free)
-        && small(&body.ipos)
-        && small(&body.iquat[1..])
-        && (body.parent == 0 || (parent.parent == 0 && parent.dof_count == 0))
-        && model.bodies.get(index + 1).is_none_or(|next| next.parent != index)
+    fits && joints.iter().all(|j| j.kind != JointType::Free) && model.stands_alone(index)
 }

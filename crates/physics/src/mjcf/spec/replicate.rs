@@ -1,7 +1,7 @@
 //! Expands `<replicate>`: copies of what it holds, in frames along a path, with numbered names.
 //!
-//! The rules are MuJoCo's. Names in a copy get `sep` and the copy's number. An element of another section that refers to things in the
-//! `<replicate>`, and to no others but the world, is copied with them, behind the other elements of its section.
+//! The rules are MuJoCo's. Names in a copy get `sep` and the copy's number. Elements of other sections may refer to things in
+//! the `<replicate>`. If they refer to nothing else but the world, they are copied, too, behind the other elements of their section.
 
 use super::super::document::Element;
 use super::super::error::MjcfError;
