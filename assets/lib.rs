@@ -24,6 +24,7 @@ pub const FILES: &[(&str, &[u8])] = files![
     "agents/hopper.xml",
     "agents/humanoid.xml",
     "agents/marathon_man.xml",
+    "agents/quadruped.xml",
     "agents/walker2d.xml",
     "dm_control/cheetah.xml",
     "dm_control/hopper.xml",

@@ -31,6 +31,7 @@ pub const FILES: &[(&str, &[u8])] = marathon_assets::files![
     "marathon_man_terrain-fast.yaml",
     "paper-appendix-b.yaml",
     "paper-appendix-c.yaml",
+    "robot-fast.yaml",
     "terrain-adversary.yaml",
     "terrain-fast.yaml",
     "walker2d-fast.yaml",

@@ -40,10 +40,12 @@ def program() -> str:
     return found
 
 
-def _about(task: Task, dt: float) -> dict[str, Any]:
-    """Return the description of a task for the game: its name, or the model of a class."""
+def _about(task: Task, dt: float, options: dict[str, Any]) -> dict[str, Any]:
+    """Return the description of a task for the game: its name, its model file, or the model of a class."""
     if isinstance(task, str):
-        return {"agent": task}
+        file = Path(options.get("xml_file") or task)
+        is_model = file.suffix.lower() == ".xml" and file.is_file()
+        return {"file": str(file.resolve()), "dt": dt} if is_model else {"agent": task}
     source = os.fspath(task.mjcf)
     if source.lstrip().startswith("<"):
         return {"model": source, "dt": dt}
@@ -53,13 +55,13 @@ def _about(task: Task, dt: float) -> dict[str, Any]:
 class Window:
     """A window onto one environment. Showing a state takes as long as a step does in the world."""
 
-    def __init__(self, task: Task, dt: float) -> None:
-        """Open the window."""
+    def __init__(self, task: Task, dt: float, options: dict[str, Any]) -> None:
+        """Open the window. `options` are those of the task."""
         self._game = subprocess.Popen(
             [program(), "--watch-stream"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0
         )
         self._open = True
-        self._write(json.dumps(_about(task, dt)).encode() + b"\n")
+        self._write(json.dumps(_about(task, dt, options)).encode() + b"\n")
 
     def show(self, qpos: FloatArray, *, begins: bool, reward: float = 0.0) -> None:
         """Show a state and wait for its time; nothing happens once the window has been closed."""

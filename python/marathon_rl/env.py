@@ -87,7 +87,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._task, self._size, self._options = task, (width, height), options
         self._renderer: Renderer | None = None
         # opened before the first episode, so that a missing dependency is reported at once
-        self._window = _window.Window(task, self.dt) if render_mode == "human" else None
+        self._window = _window.Window(task, self.dt, options) if render_mode == "human" else None
         # for the camera: time, and that of the last picture
         self._seconds = self._drawn = 0.0
         self._seeded = False

@@ -223,7 +223,7 @@ impl<'a> Stage<'a> {
             autoreset: Autoreset::Disabled,
             ..Default::default()
         };
-        let model = registry::agent(&spec.id)?.model()?;
+        let model = registry::global().agent_with(&spec.id, &spec.options)?.model()?;
         let play = Play::of(
             &TaskConfig::with_training_options(policies[0].meta()),
             &policies.iter().collect::<Vec<_>>(),

@@ -13,7 +13,7 @@ macro_rules! preset {
     };
 }
 
-const FILES: [(&str, &str); 14] = [
+const FILES: [(&str, &str); 15] = [
     preset!("hopper-fast.yaml"),
     preset!("walker2d-fast.yaml"),
     preset!("humanoid-fast.yaml"),
@@ -22,6 +22,7 @@ const FILES: [(&str, &str); 14] = [
     preset!("dm_control-fast.yaml"),
     preset!("controller-fast.yaml"),
     preset!("ant_controller-fast.yaml"),
+    preset!("robot-fast.yaml"),
     preset!("terrain-fast.yaml"),
     preset!("in_style-fast.yaml"),
     preset!("marathon_man-fast.yaml"),

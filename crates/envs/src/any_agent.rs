@@ -26,6 +26,10 @@ pub trait AnyAgent: Send + Sync {
     fn model(&self) -> Result<Model, EnvError>;
     /// The named arguments with their values.
     fn options(&self) -> Vec<OptionInfo>;
+    /// Facts that the agent has derived from its model, as lines of a table, for agents that take any model.
+    fn findings(&self) -> Option<String> {
+        None
+    }
     /// Whether there is an argument with this name.
     fn has_option(&self, name: &str) -> bool {
         self.options().iter().any(|known| known.name == name)
@@ -94,6 +98,10 @@ impl AnyAgent for WithModel {
         Ok(Arc::new(WithModel { agent, model: self.model.clone() }))
     }
 
+    fn findings(&self) -> Option<String> {
+        self.agent.findings()
+    }
+
     fn shards_as(self: Arc<Self>, facts: Facts, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {
         self.agent.clone().shards_as(facts, isa)
     }
@@ -117,20 +125,7 @@ impl<A: Agent> AnyAgent for A {
         if options.is_empty() {
             return Ok(self);
         }
-        let known = Agent::options(&*self);
-        for (name, value) in options.iter() {
-            let id = Agent::facts(&*self).id;
-            let Some(info) = known.iter().find(|info| info.name == name) else {
-                let names = || known.iter().map(|info| info.name);
-                let nearest = nearest(name, names()).map(Into::into);
-                let known = if known.is_empty() { "none".into() } else { names().collect::<Vec<_>>().join(", ") };
-                return Err(EnvError::UnknownOption { id, name: name.into(), nearest, known });
-            };
-            if !info.takes(value) {
-                let (option, found) = (name.to_string(), value.to_string());
-                return Err(EnvError::OptionValue { id, option, found, expected: info.expected });
-            }
-        }
+        check(&Agent::facts(&*self).id, &Agent::options(&*self), options)?;
         Ok(match Agent::with_options(&*self, options) {
             Some(agent) => Arc::new(agent),
             None => self,
@@ -148,6 +143,24 @@ impl<A: Agent> AnyAgent for A {
         }
         marathon_physics::with_single_lanes!(isa, T => Ok(Arc::new(AgentFactory::<T>::new(facts, options, self)?)))
     }
+}
+
+/// Whether an agent with these arguments takes the options.
+pub(crate) fn check(id: &str, known: &[OptionInfo], options: &Options) -> Result<(), EnvError> {
+    for (name, value) in options.iter() {
+        let id = id.to_string();
+        let Some(info) = known.iter().find(|info| info.name == name) else {
+            let names = || known.iter().map(|info| info.name);
+            let nearest = nearest(name, names()).map(Into::into);
+            let known = if known.is_empty() { "none".into() } else { names().collect::<Vec<_>>().join(", ") };
+            return Err(EnvError::UnknownOption { id, name: name.into(), nearest, known });
+        };
+        if !info.takes(value) {
+            let (option, found) = (name.to_string(), value.to_string());
+            return Err(EnvError::OptionValue { id, option, found, expected: info.expected });
+        }
+    }
+    Ok(())
 }
 
 /// The reason why tasks cannot run in these lanes; `None` if they can. Double precision needs the feature `double`: it adds a sixth to

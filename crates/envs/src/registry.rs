@@ -9,13 +9,19 @@ use marathon_physics::hint::{nearest, similar};
 use marathon_physics::lanes::Isa;
 
 use crate::agent::Options;
-use crate::agents;
+use crate::agents::{self, robot};
 use crate::any_agent::AnyAgent;
 use crate::error::EnvError;
 use crate::shard::{AgentShards, ShardFactory};
 
 /// Number of similar names in an error.
 const SIMILAR: usize = 5;
+
+/// The arguments that the path of an MJCF file stands for. `None` for other names.
+pub fn robot_options(name: &str) -> Option<Options> {
+    let is_file = std::path::Path::new(name).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml"));
+    is_file.then(|| Options::new().with(robot::MODEL, name))
+}
 
 /// Agents by name.
 #[derive(Clone)]
@@ -67,11 +73,14 @@ impl Registry {
     }
 
     /// The agent with a name: an id, an alias, or an id without version (which selects the lowest version). Case does
-    /// not matter.
+    /// not matter. The path of an MJCF file, `robot.xml`, is a name of the [robot] in it.
     ///
     /// # Errors
     /// If there is none. The message contains the closest name.
     pub fn agent(&self, name: &str) -> Result<Arc<dyn AnyAgent>, EnvError> {
+        if let (Some(robot), Some(options)) = (self.find(robot::rig::ID), robot_options(name)) {
+            return robot.clone().with_options(&options);
+        }
         self.find(name).cloned().ok_or_else(|| {
             let ids: Vec<_> = self.agents.iter().map(|(id, _)| id.as_str()).collect();
             let bases: Vec<_> = ids.iter().map(|id| id.rsplit_once("-v").map_or(*id, |(base, _)| base)).collect();

@@ -203,6 +203,24 @@ fn learning_begins_from_random_weights_and_ends() {
     assert_eq!(app.world().resource::<Scenario>().mode, Mode::Watch);
 }
 
+/// The robot of a file learns as an agent does; without `--mode learn` its motors have sliders.
+#[test]
+fn the_robot_of_a_file_learns() -> Result<(), Box<dyn std::error::Error>> {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/gymnasium/ant.xml").display().to_string();
+    let mut app = app(&[&file, "--mode", "learn", "--threads", "1", "--agents", "2"]);
+    let begun = Instant::now();
+    while app.world().get_resource::<TrainingRun>().is_none_or(|l| l.progress().curve.is_empty()) {
+        app.update();
+        std::thread::sleep(Duration::from_millis(5));
+        assert!(begun.elapsed() < Duration::from_secs(120), "no progress");
+    }
+    frames(&mut app, 30);
+    assert_eq!(actors(&mut app).len(), 2);
+    assert!(actors(&mut app).iter().all(|(_, episode)| episode.action.len() == 8), "the ant's motors");
+    assert_eq!(app.world().resource::<Scenario>().agent, "Robot-v0");
+    Ok(())
+}
+
 #[test]
 fn what_is_recorded_is_shown_again() -> Result<(), Box<dyn std::error::Error>> {
     let folder = tempfile::tempdir()?;

@@ -133,7 +133,7 @@ impl Behavior {
         };
         let env = VecEnv::new(&options.env, &made)?;
         let spec = env.spec().clone();
-        let model = Arc::new(registry::agent(&spec.id)?.model()?);
+        let model = Arc::new(registry::global().agent_with(&spec.id, &spec.options)?.model()?);
         let names = Names::new(&model, &spec.action_names, &spec.command, &spec.options);
         let n = env.agents();
         Ok(Behavior {

@@ -31,8 +31,8 @@ pub fn name_wholly(config: &mut TrainConfig) {
 /// If a file cannot be read.
 pub fn of(task_config: &TaskConfig, config: &TrainConfig) -> Result<Inputs, RunError> {
     let mut inputs = Inputs::new();
-    if let Some(ModelSource::File(path)) = task_config.model() {
-        inputs.extend(of_model(&path)?);
+    if let Some(path) = task_config.model().as_ref().and_then(ModelSource::file) {
+        inputs.extend(of_model(path)?);
     }
     for file in demonstrations(config) {
         inputs.insert(file.into(), sum(Path::new(file), &budget::DEMONSTRATION_FILE)?);

@@ -54,7 +54,8 @@ impl TaskConfig {
     /// # Errors
     /// If there is none; the text names the nearest.
     pub fn named(name: &str) -> Result<Self, RunError> {
-        Ok(TaskConfig { agent: registry::agent(name)?.facts().id, ..TaskConfig::default() })
+        let options = registry::robot_options(name).unwrap_or_default();
+        TaskConfig { agent: registry::agent(name)?.facts().id, options }.with(&TaskOptions::default())
     }
 
     /// The task that a policy is for, without what only helped to learn; of a role's policy, that in which it has the role.
@@ -94,10 +95,11 @@ impl TaskConfig {
             self.options.set(name, value);
         }
         // a policy or run may be used from another folder
-        if let Some(ModelSource::File(path)) = self.model()
+        if let Some(source) = self.model()
+            && let Some(path) = source.file()
             && self.options.get(XML) == Some(&Value::Text(path.to_string_lossy().into_owned()))
         {
-            self.options.set(XML, Value::Text(whole(&path).to_string_lossy().into_owned()));
+            self.options.set(XML, Value::Text(whole(path).to_string_lossy().into_owned()));
         }
         Ok(self)
     }
@@ -106,6 +108,11 @@ impl TaskConfig {
     /// reports that error.
     pub fn model(&self) -> Option<ModelSource> {
         Some(registry::global().agent_with(&self.agent, &self.options).ok()?.facts().model)
+    }
+
+    /// Facts that the task has derived from its model, if it takes any model.
+    pub fn findings(&self) -> Option<String> {
+        registry::global().agent_with(&self.agent, &self.options).ok()?.findings()
     }
 
     /// The same with all arguments that another configuration of the agent has.

@@ -23,7 +23,11 @@ impl Common {
     /// If there is no such agent.
     pub fn agents(&self, tasks_count: bool) -> Result<Vec<String>, CliError> {
         if !self.agent.is_empty() {
-            let id = |name: &String| Ok(registry::agent(name)?.facts().id);
+            // the file of a robot is its name
+            let id = |name: &String| match registry::robot_options(name) {
+                Some(_) => registry::agent(name).map(|_| name.clone()).map_err(CliError::from),
+                None => Ok(registry::agent(name)?.facts().id),
+            };
             return self.agent.iter().map(id).collect();
         }
         let mut ids: Vec<String> = Vec::new();

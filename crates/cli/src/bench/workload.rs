@@ -38,6 +38,7 @@ impl From<ModelSource> for Source {
         match source {
             ModelSource::Text(text) => Source::Text(text.into()),
             ModelSource::File(path) => Source::File(path),
+            ModelSource::Edited { spec, .. } => Source::Text(spec.to_xml()),
         }
     }
 }

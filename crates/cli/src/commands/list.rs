@@ -29,6 +29,9 @@ struct Entry {
     /// Lowest and highest action per actuator; null without bounds.
     action_range: Vec<[Option<f32>; 2]>,
     options: Vec<Argument>,
+    /// Facts that the task derives from its model, for tasks that take any model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    findings: Option<String>,
 }
 
 /// A part of an observation.
@@ -61,7 +64,7 @@ struct Argument {
 /// If the agent does not exist, or cannot be simulated.
 pub fn run(agent: Option<&str>, json: bool) -> Result<(), CliError> {
     let ids = match agent {
-        Some(name) => vec![registry::agent(name)?.facts().id],
+        Some(name) => vec![name.into()],
         None => registry::ids(),
     };
     let entries = ids.iter().map(|id| entry(id)).collect::<Result<Vec<_>, _>>()?;
@@ -73,16 +76,16 @@ pub fn run(agent: Option<&str>, json: bool) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Collects the information about an agent.
-fn entry(id: &str) -> Result<Entry, CliError> {
-    let agent = registry::agent(id)?;
-    let factory = registry::factory(id, Isa::F32)?;
+/// Collects the information about an agent, by any of its names.
+fn entry(name: &str) -> Result<Entry, CliError> {
+    let agent = registry::agent(name)?;
+    let factory = agent.clone().shards(Isa::F32)?;
     let spec = factory.spec();
     let range = |(low, high): (&f32, &f32)| [finite(*low), finite(*high)];
     let part = |group: &ObsGroup| Part { name: group.name.clone(), range: [group.range.start, group.range.end] };
     let order = |c: &CommandRange| Order { name: c.name.clone(), range: [c.low, c.high], unit: c.unit.clone() };
     Ok(Entry {
-        id: id.into(),
+        id: agent.facts().id,
         summary: agent.facts().summary,
         observation: spec.obs,
         observations: spec.observations.iter().map(part).collect(),
@@ -97,6 +100,7 @@ fn entry(id: &str) -> Result<Entry, CliError> {
         command: spec.command.iter().map(order).collect(),
         action_range: spec.action_low.iter().zip(&spec.action_high).map(range).collect(),
         options: agent.options().into_iter().map(argument).collect(),
+        findings: agent.findings(),
     })
 }
 
@@ -136,6 +140,10 @@ fn tell(e: &Entry) {
         if !names.is_empty() {
             say(format!("{what}\n  {}", names.join(", ")));
         }
+    }
+    if let Some(findings) = &e.findings {
+        say("found in the model");
+        findings.lines().for_each(|line| say(format!("  {line}")));
     }
     if !e.options.is_empty() {
         say("options");

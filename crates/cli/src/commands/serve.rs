@@ -104,7 +104,7 @@ impl<'a> Folder<'a> {
         self.seen = self.written();
         let (policies, factory) = self.source.load_all()?;
         let spec = factory.spec().clone();
-        let model = registry::agent(&spec.id)?.model()?;
+        let model = registry::global().agent_with(&spec.id, &spec.options)?.model()?;
         Ok(Loaded { policies, spec, model })
     }
 

@@ -87,6 +87,9 @@ fn announce(session: &Session) {
         0 => ("training", String::new()),
         _ => ("going on with", format!(" from step {}", text::thousands(done))),
     };
+    if let Some(findings) = session.task_config.findings() {
+        findings.lines().for_each(terminal::note);
+    }
     terminal::note(format!(
         "{verb} {}{from} to {}: {} agents, {} thread{}, {}, seed {}; results in {}",
         run.agent,

@@ -1,7 +1,7 @@
 //! Constant facts of an agent: model, names and timing.
 
 use std::borrow::Cow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use marathon_motion::Clip;
@@ -104,12 +104,32 @@ pub fn names<S: AsRef<str>>(list: impl IntoIterator<Item = S>) -> Vec<String> {
 }
 
 /// Source of an agent's model.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub enum ModelSource {
     /// MJCF text that refers to no other files.
     Text(Cow<'static, str>),
     /// An MJCF file.
     File(PathBuf),
+    /// An MJCF file with changes.
+    Edited {
+        /// The file.
+        path: PathBuf,
+        /// The model with the changes.
+        spec: Arc<ModelSpec>,
+    },
+}
+
+impl PartialEq for ModelSource {
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (ModelSource::Text(a), ModelSource::Text(b)) => a == b,
+            (ModelSource::File(a), ModelSource::File(b)) => a == b,
+            (ModelSource::Edited { path: a, spec: x }, ModelSource::Edited { path: b, spec: y }) => {
+                a == b && x.to_xml() == y.to_xml()
+            }
+            _ => false,
+        }
+    }
 }
 
 impl ModelSource {
@@ -117,7 +137,15 @@ impl ModelSource {
     pub fn text(&self) -> Option<&str> {
         match self {
             ModelSource::Text(text) => Some(text),
-            ModelSource::File(_) => None,
+            ModelSource::File(_) | ModelSource::Edited { .. } => None,
+        }
+    }
+
+    /// The file that it was read from.
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            ModelSource::Text(_) => None,
+            ModelSource::File(path) | ModelSource::Edited { path, .. } => Some(path),
         }
     }
 
@@ -129,6 +157,7 @@ impl ModelSource {
         match self {
             ModelSource::Text(text) => ModelSpec::from_xml_str(text, name),
             ModelSource::File(path) => ModelSpec::from_xml_file(path),
+            ModelSource::Edited { spec, .. } => Ok(ModelSpec::clone(spec)),
         }
     }
 }

@@ -1,8 +1,9 @@
-//! The agents of this crate, one file each: Marathon's own, and the tasks of Gymnasium and dm_control.
+//! The agents of this crate: Marathon's own, the tasks of Gymnasium and dm_control, and a task for any robot.
 
 pub mod dm_control;
 pub mod gymnasium;
 pub mod marathon;
+pub mod robot;
 
 use std::sync::Arc;
 
@@ -14,7 +15,7 @@ use crate::any_agent::AnyAgent;
 /// All agents, in the order of listings. Without the feature `suite`, those of [`marathon::core`].
 pub fn all() -> Vec<Arc<dyn AnyAgent>> {
     #[cfg(feature = "suite")]
-    return [marathon::all(), gymnasium::all(), dm_control::all()].concat();
+    return [marathon::all(), gymnasium::all(), dm_control::all(), vec![Arc::new(robot::AnyRobot::default())]].concat();
     #[cfg(not(feature = "suite"))]
     marathon::core()
 }

@@ -30,6 +30,7 @@ Examples:
   marathon-game humanoid --agents 16             a row of them
   marathon-game runs/hopper-1                    the policy of a run, which is read again whenever training saves it
   marathon-game hopper --mode learn              from random weights to a run, before your eyes
+  marathon-game my-robot.xml --mode learn        the same for the robot of a file
   marathon-game --mode imitate                   a person walks, beside the clip that it follows; N: runs, flips
   marathon-game MarathonMan --mode imitate --option clip=my.bvh   a clip of your own; L learns it
   marathon-game walker --mode push               click to push, B to throw balls, sliders for gravity and friction
@@ -275,22 +276,16 @@ pub fn scenario(args: &Args, shipped: &ShippedPolicies) -> Result<Scenario, Game
     let what = args.what();
     let path = Path::new(what);
     let is_model = path.extension().is_some_and(|e| e == "xml" || e == "mjcf");
+    let robot = registry::robot_options(what).is_some();
     let given = match (&args.policy, registry::agent(what)) {
+        // the file of a robot is a task if it is to learn or has learned, and a model to try otherwise
+        (None, _) if robot && args.mode != Mode::Learn => return testbed(scenario, path, args),
         (_, Ok(agent)) => {
-            scenario.agent = agent.facts().id;
+            scenario.agent = if robot { what.into() } else { agent.facts().id };
             args.policy.clone()
         }
-        (_, Err(_)) if is_model => {
-            exists(path)?;
-            Model::from_xml_file(path).map_err(Box::new)?;
-            (scenario.mode, scenario.model, scenario.source) =
-                (Mode::Testbed, Some(path.into()), PolicySource::Nothing);
-            scenario.agent = "hopper".into();
-            if !args.task.given.is_empty() {
-                return Err(RunError::option("option", "is for tasks, and a model of the test bed has none").into());
-            }
-            return Ok(scenario);
-        }
+        (_, Err(error)) if robot => return Err(error.into()),
+        (_, Err(_)) if is_model => return testbed(scenario, path, args),
         (None, Err(_)) if path.exists() || what.contains(['/', '.']) => {
             exists(path)?;
             check_is_policy(path)?;
@@ -317,6 +312,7 @@ pub fn scenario(args: &Args, shipped: &ShippedPolicies) -> Result<Scenario, Game
         return Err(RunError::option("mode", problem).into());
     }
     scenario.chosen = TaskConfig::named(&scenario.agent)?.with(&args.task)?;
+    scenario.agent.clone_from(&scenario.chosen.agent);
     if scenario.mode == Mode::Course {
         scenario.course.take_from(&scenario.chosen.options);
     }
@@ -335,6 +331,22 @@ pub fn scenario(args: &Args, shipped: &ShippedPolicies) -> Result<Scenario, Game
         scenario.play(PolicySource::Trainer, shipped);
     }
     Ok(scenario)
+}
+
+/// The scenario that tries the motors of a model.
+fn testbed(scenario: Scenario, model: &Path, args: &Args) -> Result<Scenario, GameError> {
+    exists(model)?;
+    Model::from_xml_file(model).map_err(Box::new)?;
+    if !args.task.given.is_empty() {
+        return Err(RunError::option("option", "is for tasks, and a model of the test bed has none").into());
+    }
+    Ok(Scenario {
+        mode: Mode::Testbed,
+        model: Some(model.into()),
+        source: PolicySource::Nothing,
+        agent: "hopper".into(),
+        ..scenario
+    })
 }
 
 /// The course of a command line.
