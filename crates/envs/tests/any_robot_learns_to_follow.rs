@@ -167,7 +167,7 @@ fn a_bare_model_is_made_ready() {
     std::fs::remove_file(&file).expect("the file goes");
 }
 
-/// A straight knee bends in a pose that nobody has chosen, and only there.
+/// A straight knee bends in the reference pose. A keyframe stays as its author made it.
 #[test]
 fn straight_knees_bend() {
     for file in ["dm_control/humanoid.xml", "dm_control/walker.xml", "gymnasium/walker2d.xml"] {

@@ -1,10 +1,10 @@
-//! Bent knees for a standing pose that nobody has chosen: a straight leg can neither push nor swing.
+//! Bent knees for a standing pose without an author: a straight leg can neither push nor swing.
 
 use glam::DVec3;
 use marathon_motion::kinematics::Pose;
 use marathon_physics::model::{JointType, Model};
 
-use super::rig::legs;
+use super::legs::legs;
 use super::stance::Foot;
 
 /// Angle below which a knee is straight, rad: a tenth of half a turn.

@@ -24,6 +24,7 @@ pub mod arguments;
 mod edits;
 mod hold;
 mod knees;
+mod legs;
 pub mod rig;
 pub mod servos;
 pub mod stance;

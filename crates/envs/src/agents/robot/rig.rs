@@ -13,6 +13,7 @@ use super::arguments::{Gait, RobotArguments, Task};
 use super::edits;
 use super::hold::Hold;
 use super::knees;
+use super::legs::{legs, moves_sideways};
 use super::servos::{self, Drive};
 use super::stance::{self, Foot, Root, Stance};
 use crate::agent::ModelSource;
@@ -220,37 +221,6 @@ impl Rig {
 
 /// The keyframe that episodes start from.
 const SPAWN: &str = "spawn";
-
-/// Joints from a body up to the root, without those of the root.
-fn joints_to(model: &Model, mut body: usize, root: usize) -> Vec<usize> {
-    let mut joints = Vec::new();
-    while body != 0 && body != root {
-        let here = &model.bodies[body];
-        joints.extend(here.joint_start..here.joint_start + here.joint_count);
-        body = here.parent;
-    }
-    joints
-}
-
-/// The joints of each leg, from the root to the foot, without those that several legs share.
-pub(super) fn legs(model: &Model, feet: &[Foot], root: usize) -> Vec<Vec<usize>> {
-    let paths: Vec<_> = feet.iter().map(|foot| joints_to(model, foot.body, root)).collect();
-    let users = |joint: &usize| paths.iter().filter(|path| path.contains(joint)).count();
-    paths.iter().map(|path| path.iter().rev().copied().filter(|joint| users(joint) == 1).collect()).collect()
-}
-
-/// Whether a joint of a leg moves its foot to a side.
-fn moves_sideways(model: &Model, pose: &Pose, foot: &Foot, root: usize) -> bool {
-    joints_to(model, foot.body, root).into_iter().any(|joint| {
-        let arm = DVec3::from_array(foot.place) - pose.anchors[joint];
-        match model.joints[joint].kind {
-            JointType::Hinge => pose.axes[joint].cross(arm).y.abs() > 0.2 * arm.length(),
-            JointType::Slide => pose.axes[joint].y.abs() > 0.2,
-            JointType::Ball => true,
-            JointType::Free => false,
-        }
-    })
-}
 
 /// Standard deviation of a servo's joint around the standing pose, rad. `legs`: joints of legs; without any, all are like them.
 fn spread(model: &Model, pose: &Pose, drive: &Drive, legs: &[usize]) -> f64 {
