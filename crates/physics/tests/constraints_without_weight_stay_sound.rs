@@ -1,9 +1,8 @@
-//! Promise: a contact with a body that can only turn about its own center does not throw the other body, and a string
-//! that no joint moves in the reference configuration does not throw the bodies at its ends.
+//! Promise: constraints without inverse weight throw no body. One is a contact with a body that can only turn about its
+//! own center. Another one is the limit of a string that no joint moves in the reference configuration.
 //!
-//! Such a body has no translational inverse inertia, and MuJoCo makes the constraint harder than double precision
-//! resolves. Here single precision has the accelerations and velocities of double precision to 1e-2, in every lane
-//! width, and both stay near MuJoCo's next velocities.
+//! MuJoCo makes such constraints harder than double precision resolves. Here single precision has the accelerations and
+//! velocities of double precision to 1e-2, in every lane width, and both stay near MuJoCo's next velocities.
 
 mod common;
 
