@@ -18,7 +18,7 @@ CONES = ["Pyramidal", "Elliptic"]
 SOLVERS = ["Pgs", "Cg", "Newton"]
 FLAGS = [
     "constraint", "equality", "limit", "contact", "frictionloss", "spring", "damper", "gravity", "clampctrl", "warmstart",
-    "actuation", "refsafe", "eulerdamp", "filterparent", "multiccd", "island", "midphase",
+    "actuation", "refsafe", "eulerdamp", "filterparent", "multiccd", "nativeccd", "island", "midphase",
 ]
 SENSORS = {
     "TOUCH": "Touch", "ACCELEROMETER": "Accelerometer", "VELOCIMETER": "Velocimeter", "GYRO": "Gyro",

@@ -10,10 +10,12 @@ Otherwise reads JSON from standard input. For `null`, prints the list of the fil
      "error": why MuJoCo does not load it or null, "warns": whether MuJoCo warns about its reference configuration,
      "empty": whether it has neither bodies nor geoms, as parts for inclusion have not,
      "nq": .., "nv": .., "nu": .., "ngeom": .., "features": [..]}
-For a list of jobs {"xml": path, "states": n, "seed": s}, prints random states as dynamics.py does, but
-only those in which MuJoCo's answer is well defined:
+For a list of jobs {"xml": path, "states": n, "seed": s, "hulls": hulls or null}, prints random states as dynamics.py does,
+but only those in which MuJoCo's answer is well defined:
     {"states": [..], "skipped": states that were drawn and left out,
      "iterates": whether some contacts are found by iteration}
+Given hulls, MuJoCo's are ordered like them (sides.py), and each state has "by_order": the relative change of the
+acceleration if the sides of MuJoCo's hulls are ordered at random instead.
 The solver's settings are those of the file. Where they let it converge, the answers are those of the same problem solved to
 the end, and `own` is the acceleration under the file's settings, with the number of iterations.
 Sensor values that rounding decides are null.
@@ -32,6 +34,7 @@ import mujoco
 import numpy as np
 
 import dynamics
+import sides
 from converging import converges, solve_to_the_end
 
 HERE = Path(__file__).parent
@@ -50,6 +53,8 @@ CCD_TOLERANCE, CCD_ITERATIONS = 1e-15, 1000
 NUDGES = 8
 # contacts of an iteration that are less deep may point anywhere, m
 SHALLOW = 2e-6
+# orders of the sides of hulls that are tried
+ORDERS = 3
 # draws per state that is asked for
 PATIENCE = 10
 
@@ -216,8 +221,22 @@ def state_of(model, data, rng):
     return state
 
 
+def change_by_order(model, data, state):
+    """Largest relative change of the acceleration if the sides of hulls are ordered at random."""
+    acc, changes = np.array(state["qacc"]), []
+    for seed in range(ORDERS):
+        shuffled = copy.copy(model)
+        sides.shuffle(shuffled, np.random.default_rng(seed))
+        forward(shuffled, data, [state[k] for k in ("qpos", "qvel", "ctrl", "act")])
+        changes.append(np.linalg.norm(data.qacc - acc) / max(np.linalg.norm(acc), 1.0))
+    return float(max(changes))
+
+
 def run(job):
     own = mujoco.MjModel.from_xml_path(job["xml"])
+    hulls = job.get("hulls")
+    if hulls:
+        sides.order_alike(own, hulls)
     if own.nhfield:
         own.opt.ccd_tolerance = CCD_TOLERANCE
         own.opt.ccd_iterations = CCD_ITERATIONS
@@ -239,6 +258,7 @@ def run(job):
         forward(own, data, [s[k] for k in ("qpos", "qvel", "ctrl", "act")])
         s["own"] = data.qacc.tolist()
         s["iterations"] = int(data.solver_niter.max())
+        s["by_order"] = change_by_order(model, data, s) if hulls else None
     return {"states": states, "skipped": len(draws) - len(states), "iterates": iterates(own)}
 
 

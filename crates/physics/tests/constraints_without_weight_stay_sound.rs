@@ -1,8 +1,8 @@
-//! Promise: a contact with a body that can only turn about its own center does not throw the other body.
+//! Promise: constraints without inverse weight throw no body. One is a contact with a body that can only turn about its
+//! own center. Another one is the limit of a string that no joint moves in the reference configuration.
 //!
-//! Such a body has no translational inverse inertia, and MuJoCo makes the constraint harder than double precision
-//! resolves. Here single precision has the accelerations and velocities of double precision to 1e-2, in every lane
-//! width, and both stay near MuJoCo's next velocities.
+//! MuJoCo makes such constraints harder than double precision resolves. Here single precision has the accelerations and
+//! velocities of double precision to 1e-2, in every lane width, and both stay near MuJoCo's next velocities.
 
 mod common;
 
@@ -35,6 +35,21 @@ const MODELS: [(&str, &str); 5] = [
         r#"<body name="b"><joint type="ball" armature=".04"/><geom type="box" size=".05 .12 .11"/></body>"#,
     ),
 ];
+
+/// Bodies that move in two parallel planes, and a string from one to the other. In the reference configuration, no joint
+/// changes its length.
+const STRING: &str = r#"<default><geom conaffinity="0" contype="1"/><joint armature="0.1"/></default><worldbody>
+    <geom type="plane" size="9 9 1" conaffinity="1"/>
+    <body pos="0 -1 0.5"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/><joint axis="0 1 0"/>
+      <geom type="capsule" size="0.1" fromto="-0.3 0 0 0.3 0 0"/><site name="a"/><body pos="0.3 0 0">
+      <joint axis="0 1 0" range="-60 60"/><geom type="capsule" size="0.08" fromto="0 0 0 0.2 0 -0.4"/></body></body>
+    <body pos="0 1 0.5"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/><joint axis="0 1 0"/>
+      <geom type="capsule" size="0.1" fromto="-0.3 0 0 0.3 0 0"/><site name="b"/><body pos="0.3 0 0">
+      <joint axis="0 1 0" range="-60 60"/><geom type="capsule" size="0.08" fromto="0 0 0 0.2 0 -0.4"/></body></body>
+    </worldbody><tendon><spatial name="s" range="0 2.2"><site site="a"/><site site="b"/></spatial></tendon>
+    <sensor><tendonlimitfrc tendon="s"/></sensor>"#;
+/// The same string with a fixed length.
+const TIE: &str = r#"<option><flag limit="disable"/></option><equality><tendon tendon1="s"/></equality>"#;
 
 /// Acceleration in a state, and velocity after a step.
 struct Motion {
@@ -105,4 +120,43 @@ fn constraints_without_weight_stay_sound() {
         }
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+#[test]
+fn strings_without_weight_move_as_in_mujoco() {
+    for (name, more) in [("limit", ""), ("tie", TIE)] {
+        let path = std::path::PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("weightless-{name}.xml"));
+        std::fs::write(&path, format!("<mujoco>{STRING}{more}</mujoco>")).expect("it is written");
+        let answer = common::oracle("foreign_models.py", &json!([{"xml": path, "states": 40, "seed": 1}]));
+        let states = answer[0]["states"].as_array().expect("a list");
+        let tight = states.iter().filter(|s| s["sensordata"][0].as_f64().is_some_and(|force| force > 1.0)).count();
+        assert!(tight >= 10 || name == "tie", "the string pulls in {tight} states only");
+
+        let mut model = Model::from_xml_file(&path).unwrap_or_else(|e| panic!("{e}"));
+        assert!(model.tendons[0].invweight0 < 1e-15);
+        // as in the oracle: the solver ends at rounding
+        (model.opt.tolerance, model.opt.iterations) = (1e-14, 200);
+        let sim = Sim::<f64>::new(&model, SimOptions::default()).expect("it can be simulated");
+        let mut work = Work::new(&sim);
+        let [mut acceleration, mut force] = [0.0f64; 2];
+        for s in states {
+            let mut group = Group::new(&sim);
+            group.reset_lane(&sim, 0, &numbers(&s["qpos"]), &numbers(&s["qvel"]));
+            sim.forward(&mut work, &group);
+            let r = Readings::new(&sim, &group, &work);
+            let qacc: Vec<f64> = (0..model.nv).map(|d| r.qacc(d)).collect();
+            acceleration = acceleration.max(distance(&qacc, &numbers(&s["qacc"]), 1.0));
+            force = force.max(distance(&r.constraint_forces(), &numbers(&s["qfrc_constraint"]), 1.0));
+        }
+        println!("{name}: accelerations {acceleration:.1e}, forces {force:.1e}");
+        assert!(acceleration < 1e-8 && force < 1e-7, "{name}: accelerations {acceleration:.1e}, forces {force:.1e}");
+
+        let truth = play::<f64>(&model, states);
+        for isa in Isa::ALL.into_iter().filter(|i| i.supported() && *i != Isa::F64) {
+            let found = with_lanes!(isa, T => play::<T>(&model, states));
+            let off = largest(found.iter().zip(&truth).map(|(a, b)| distance(&a.qacc, &b.qacc, 1.0)));
+            println!("{name}, {}: accelerations {off:.0e}", isa.name());
+            assert!(off < 1e-3, "{name}, {}: accelerations {off:.1e}", isa.name());
+        }
+    }
 }

@@ -58,6 +58,14 @@ const CASES: &[(&str, f64)] = &[
         1e-2,
     ),
     (
+        r#"<mujoco model="closed forms beside libccd"><option><flag nativeccd="disable"/></option><worldbody>
+        <geom type="plane" size="2 2 1"/><geom type="cylinder" size="0.1 0.2" pos="-0.3 0 0" contype="2" conaffinity="0"/>
+        <body pos="0 0 0.12" euler="5 0 0"><freejoint/><geom type="box" size="0.2 0.2 0.1"/></body>
+        <body pos="0.05 0.02 0.34" euler="0 3 20"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>
+        <body pos="-0.32 0.02 0.3"><freejoint/><geom size="0.08" conaffinity="3"/></body></worldbody></mujoco>"#,
+        1e-8,
+    ),
+    (
         r#"<mujoco model="cylinders and ellipsoids on hills"><asset>
         <hfield name="h" nrow="4" ncol="4" size="1 1 0.2 0.1" elevation="0 1 0 1 1 0 1 0 0 1 1 0 1 0 0 1"/></asset><worldbody>
         <geom type="hfield" hfield="h"/>

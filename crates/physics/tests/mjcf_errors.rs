@@ -186,7 +186,6 @@ fn what_is_not_supported_is_refused_by_name() {
         ("<option actuatorgroupdisable='1'/>", &["<option> attribute 'actuatorgroupdisable'"]),
         ("<option integrator='discrete'/>", &["'discrete' is not supported; use Euler or RK4"]),
         ("<option><flag speculative='enable'/></option>", &["<flag> attribute 'speculative'", "only 'disable'"]),
-        ("<option><flag nativeccd='disable'/></option>", &["<flag> attribute 'nativeccd'", "only 'enable'"]),
         ("<compiler coordinate='global'/>", &["global coordinates are not supported"]),
         ("<compiler fusestatic='true'/>", &["attribute 'fusestatic'"]),
         ("<contact><pair geom1='g' geom2='g' solreffriction='1 1'/></contact>", &["attribute 'solreffriction'"]),

@@ -93,9 +93,9 @@ const TOP: &[Rule] = &[
         &[rule(
             "flag",
             "constraint equality limit contact frictionloss spring damper gravity clampctrl warmstart actuation \
-             refsafe eulerdamp filterparent island midphase multiccd override",
+             refsafe eulerdamp filterparent island midphase multiccd nativeccd override",
             "autoreset energy fwdinv invdiscrete",
-            "sensor=enable nativeccd=enable sleep=disable diagexact=disable ipc=disable \
+            "sensor=enable sleep=disable diagexact=disable ipc=disable \
              speculative=disable",
         )],
     ),

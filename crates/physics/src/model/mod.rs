@@ -190,6 +190,9 @@ pub struct Flags {
     pub filterparent: bool,
     /// Whether pairs of convex shapes with flat faces have several contacts.
     pub multiccd: bool,
+    /// Whether MuJoCo finds contacts of convex shapes with its own functions instead of the library libccd. The
+    /// simulator refuses contacts that need libccd.
+    pub nativeccd: bool,
     /// Whether trees that no constraint connects are solved separately.
     pub island: bool,
     /// MuJoCo's middle phase of collision. It only decides the order of contacts, which the second solver for friction

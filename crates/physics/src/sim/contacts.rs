@@ -136,6 +136,14 @@ pub(super) fn contacts<T: Real>(
                     );
                 }
                 let spec = out.specs.len() as u32 - 1;
+                if !model.opt.flags.nativeccd && out.specs[spec as usize].shapes.iterates() {
+                    let (ka, kb) = (model.geoms[a].kind, model.geoms[b].kind);
+                    let (first, second) = (label(model, a), label(model, b));
+                    return refuse(
+                        format!("nativeccd=\"disable\" with contact of the {ka:?} {first} with the {kb:?} {second}"),
+                        "remove the flag: libccd, which it selects, finds other contacts",
+                    );
+                }
                 out.pairs.push(GeomPair { geoms, spec });
                 if number.is_none() {
                     known.insert([kinds[a], kinds[b]], spec);
@@ -200,5 +208,34 @@ fn rank(kind: GeomType) -> usize {
         GeomType::Cylinder => 5,
         GeomType::Box => 6,
         GeomType::Mesh => 7,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::model::Model;
+    use crate::sim::{Sim, SimOptions};
+
+    #[test]
+    fn contacts_that_need_libccd_are_refused() {
+        let load = |fixed: &str, moving: &str| {
+            let text = format!(
+                r#"<mujoco><option><flag nativeccd="disable"/></option><asset><hfield name="h" nrow="2" ncol="2" size="1 1 1 1"/></asset>
+                <worldbody><geom name="f" {fixed}/><body><freejoint/><geom name="m" {moving}/></body></worldbody></mujoco>"#
+            );
+            let model = Model::from_xml_str(&text, "libccd").expect("a model");
+            Sim::<f32>::new(&model, SimOptions::default()).map(|_| ()).map_err(|e| e.to_string())
+        };
+        let shape = |kind: &str| format!(r#"type="{kind}" size="0.1 0.1 0.1""#);
+        for kind in ["sphere", "capsule", "ellipsoid", "cylinder", "box"] {
+            assert_eq!(load(&shape("plane"), &shape(kind)), Ok(()), "{kind}");
+            let error = load(r#"type="hfield" hfield="h""#, &shape(kind)).unwrap_err();
+            assert!(error.contains("nativeccd=\"disable\" with contact of the Hfield 'f' with the"), "{error}");
+        }
+        for kind in ["sphere", "box"] {
+            assert_eq!(load(&shape("box"), &shape(kind)), Ok(()), "{kind}");
+        }
+        let error = load(&shape("box"), &shape("cylinder")).unwrap_err();
+        assert!(error.contains("contact of the Cylinder 'm' with the Box 'f'"), "{error}");
     }
 }

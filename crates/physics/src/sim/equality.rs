@@ -3,7 +3,7 @@
 use super::link::Mount;
 use super::softness::{Softness, softness};
 use super::tendon::{TendonSpec, Term};
-use super::weights::{inverse_weights, is_hard};
+use super::weights::{inverse_weights, is_hard, tendon_weight};
 use super::weld::BodyMount;
 use crate::algebra::rigid::{self, quat_to_rot};
 use crate::algebra::spatial::{quat_mul, rot_to_quat};
@@ -73,7 +73,6 @@ pub(super) fn equalities<T: Real>(
     }
     for (index, e) in model.equalities.iter().enumerate().filter(|(_, e)| e.active) {
         let dof_weight = |j: usize| model.dofs[model.joints[j].dof_adr].invweight0;
-        let tendon_weight = |t: usize| model.tendons[t].invweight0;
         let (tie, diag) = match &e.kind {
             EqualityKind::Connect { bodies, anchors, .. } => {
                 (tie_bodies::<T>(mounts, link_of, bodies, anchors, None), inverse_weights(model, mounts, *bodies))
@@ -88,7 +87,7 @@ pub(super) fn equalities<T: Real>(
             ),
             EqualityKind::Tendon { tendon1, tendon2, polycoef } => (
                 Tie::Lengths { follower: tendon(*tendon1), leader: tendon2.map(tendon), poly: polycoef.map(c) },
-                [tendon_weight(*tendon1) + tendon2.map_or(0.0, tendon_weight); 2],
+                [tendon_weight::<T>(model, [Some(*tendon1), *tendon2]); 2],
             ),
         };
         let soft = softness::<T>(model, &e.solref, &e.solimp, 0.0, diag[0]);

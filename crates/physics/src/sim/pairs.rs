@@ -58,6 +58,14 @@ impl ShapePair {
     }
 }
 
+impl ShapePair {
+    /// Whether the contacts depend on MuJoCo's flag `nativeccd`.
+    pub(super) fn iterates(self) -> bool {
+        use ShapePair as P;
+        matches!(self, P::Convex | P::FieldCapsule | P::FieldBox | P::FieldConvex)
+    }
+}
+
 /// Test that decides whether a pair can touch at all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Cull {

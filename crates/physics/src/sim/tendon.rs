@@ -3,6 +3,7 @@
 use super::limit::split;
 use super::softness::{Softness, softness};
 use super::string;
+use super::weights::tendon_weight;
 use crate::lanes::Real;
 use crate::model::{Model, Tendon, TendonKind};
 use std::ops::Range;
@@ -52,7 +53,7 @@ pub(super) fn tendons<T: Real>(model: &Model) -> Vec<TendonSpec<T::Scalar>> {
     let c = T::scalar;
     let flags = &model.opt.flags;
     let mut count = 0;
-    let mut spec = |t: &Tendon| {
+    let mut spec = |(index, t): (usize, &Tendon)| {
         let dofs = string::dofs(model, &t.kind);
         let moments = count..count + dofs.len();
         count = moments.end;
@@ -70,6 +71,7 @@ pub(super) fn tendons<T: Real>(model: &Model) -> Vec<TendonSpec<T::Scalar>> {
         let moves = !(terms.is_empty() && dofs.is_empty());
         let limited = moves && t.limited && flags.limit && flags.constraint;
         let rubs = moves && t.frictionloss > 0.0 && flags.frictionloss && flags.constraint;
+        let weight = tendon_weight::<T>(model, [Some(index), None]);
         TendonSpec {
             terms,
             dofs,
@@ -79,14 +81,14 @@ pub(super) fn tendons<T: Real>(model: &Model) -> Vec<TendonSpec<T::Scalar>> {
             slack: t.spring_length.map(c),
             damping: c(if flags.damper { t.damping } else { 0.0 }),
             limit: limited.then(|| {
-                let soft = softness::<T>(model, &t.solref_limit, &t.solimp_limit, t.margin, t.invweight0);
+                let soft = softness::<T>(model, &t.solref_limit, &t.solimp_limit, t.margin, weight);
                 (split::<T>(t.range[0]), split::<T>(t.range[1]), soft)
             }),
             friction: rubs.then(|| {
-                let soft = softness::<T>(model, &t.solref_friction, &t.solimp_friction, 0.0, t.invweight0);
+                let soft = softness::<T>(model, &t.solref_friction, &t.solimp_friction, 0.0, weight);
                 (c(t.frictionloss), soft)
             }),
         }
     };
-    model.tendons.iter().map(&mut spec).collect()
+    model.tendons.iter().enumerate().map(&mut spec).collect()
 }

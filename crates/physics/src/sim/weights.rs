@@ -1,6 +1,7 @@
 //! Approximate inverse inertias for constraints between two bodies.
 
 use super::weld::BodyMount;
+use crate::lanes::Real;
 use crate::model::Model;
 
 /// Fraction of a body's other inverse inertia below which an inverse inertia counts as zero.
@@ -9,6 +10,9 @@ const NOTHING: f64 = 1e-6;
 /// Fraction that replaces it. At this value, the softness of the constraint and its rounding error in single precision
 /// are of similar size.
 const LEAST: f64 = 1e-2;
+
+/// The same for tendons, in double and in single precision: smaller ones make rounding errors larger than the softness.
+const LEAST_OF_TENDONS: [f64; 2] = [1e-10, 1e-4];
 
 /// A constraint that is harder than its bodies by this factor is hard for single precision.
 const HARD: f64 = 1e-2;
@@ -24,6 +28,21 @@ pub(crate) fn inverse_weights(model: &Model, mounts: &[BodyMount], bodies: [usiz
         let other = other_weight(model, mounts, bodies, k);
         if own < NOTHING * other { LEAST * other } else { own }
     })
+}
+
+/// The sum of MuJoCo's inverse weights of tendons, unless it is next to nothing.
+///
+/// A string that nothing moves in the reference configuration has none, and MuJoCo uses 1e-15. Its constraint is then
+/// exact, but the rounding of such hard rows leads the solver astray. Here it is exact to rounding.
+pub(crate) fn tendon_weight<T: Real>(model: &Model, tendons: [Option<usize>; 2]) -> f64 {
+    let tendons = || tendons.iter().flatten().map(|t| &model.tendons[*t]);
+    let own: f64 = tendons().map(|t| t.invweight0).sum();
+    let body = |site: usize| model.bodies[model.sites[site].body].invweight0[0];
+    let spans = tendons().flat_map(|t| t.kind.spans());
+    let most: f64 = spans.map(|s| (body(s.sites[0]) + body(s.sites[1])) / (s.divisor * s.divisor)).sum();
+    let [double, single] = LEAST_OF_TENDONS;
+    let (nothing, least) = if T::EPSILON < 1e-12 { (double, double) } else { (NOTHING, single) };
+    if own < nothing * most { least * most } else { own }
 }
 
 /// An inverse weight estimated from that of the other kind of motion, as if the bodies were free.
