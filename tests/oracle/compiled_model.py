@@ -256,10 +256,16 @@ def actuator(m, i):
     gain, bias = m.actuator_gainprm[i, :3], m.actuator_biasprm[i, :3]
     transmission = {
         mujoco.mjtTrn.mjTRN_JOINT: "Joint", mujoco.mjtTrn.mjTRN_JOINTINPARENT: "JointInParent",
-        mujoco.mjtTrn.mjTRN_TENDON: "Tendon",
+        mujoco.mjtTrn.mjTRN_TENDON: "Tendon", mujoco.mjtTrn.mjTRN_SITE: "Site",
+        mujoco.mjtTrn.mjTRN_SLIDERCRANK: "SliderCrank",
     }.get(mujoco.mjtTrn(m.actuator_trntype[i]), "Unsupported")
+    target, other = m.actuator_trnid[i]
+    target = {
+        "Site": {"site": target, "reference": other if other >= 0 else "none"},
+        "SliderCrank": {"crank": target, "slider": other, "rod": m.actuator_cranklength[m.actuator_outadr[i]]},
+    }.get(transmission, target)
     return {
-        "name": name(m, mujoco.mjtObj.mjOBJ_ACTUATOR, i), "transmission": {transmission: m.actuator_trnid[i, 0]},
+        "name": name(m, mujoco.mjtObj.mjOBJ_ACTUATOR, i), "transmission": {transmission: target},
         "gear": m.actuator_gear[i], "ctrl_limited": bool(m.actuator_ctrllimited[i]),
         "ctrl_range": m.actuator_ctrlrange[i], "force_limited": bool(m.actuator_forcelimited[i]),
         "force_range": m.actuator_forcerange[i],

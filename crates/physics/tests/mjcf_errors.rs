@@ -171,8 +171,6 @@ fn what_is_not_supported_is_refused_by_name() {
         ("<deformable><flex/></deformable>", &["<flex>: deformable bodies"]),
         ("<extension><plugin><instance/></plugin></extension>", &["plugins are not supported"]),
         ("<actuator><muscle joint='j'/></actuator>", &["<muscle>: only the actuators motor"]),
-        ("<actuator><motor site='s'/></actuator>", &["<motor> attribute 'site'"]),
-        ("<actuator><motor cranksite='s' slidersite='s'/></actuator>", &["<motor> attribute 'cranksite'"]),
         ("<actuator><general body='b'/></actuator>", &["<general> attribute 'body'"]),
         ("<actuator><motor joint='j' delay='.1' nsample='2'/></actuator>", &["<motor> attribute 'delay'", "only '0'"]),
         ("<actuator><pid joint='j'/></actuator>", &["<pid>: only the actuators motor"]),
@@ -490,6 +488,29 @@ fn what_is_no_file_is_not_read() {
         assert!(message.contains("cannot read the file: found a "), "{message}");
     }
     std::fs::remove_dir_all(folder).unwrap();
+}
+
+/// Sites that an actuator acts on.
+#[test]
+fn sites_of_actuators() {
+    for (motor, parts) in [
+        ("site='t'", &["there is no site 't'", "did you mean 's'?"][..]),
+        ("site='s' refsite='t'", &["there is no site 't'"]),
+        ("site='s' joint='j'", &["there are both 'joint' and 'site'"]),
+        ("joint='j' refsite='s'", &["'refsite' needs 'site', but there is 'joint'"]),
+        ("site='s' slidersite='s'", &["'slidersite' needs 'cranksite', but there is 'site'"]),
+        ("joint='j' cranklength='1'", &["'cranklength' needs 'cranksite', but there is 'joint'"]),
+        ("cranksite='s' cranklength='1'", &["the attribute 'slidersite' is missing"]),
+        ("cranksite='s' slidersite='t' cranklength='1'", &["there is no site 't'"]),
+        ("cranksite='s' slidersite='s'", &["'cranklength' is 0; it must be positive"]),
+        ("cranksite='s' slidersite='s' cranklength='-1'", &["'cranklength' is -1; it must be positive"]),
+        ("site='s' damping='1'", &["'damping' needs a joint or a tendon"]),
+        ("cranksite='s' slidersite='s' cranklength='1' armature='1'", &["'armature' needs a joint or a tendon"]),
+    ] {
+        check(&with_section(&format!("<actuator><motor {motor}/></actuator>")), parts);
+    }
+    let servo = "<actuator><position site='s' inheritrange='1'/></actuator>";
+    check(&with_section(servo), &["'inheritrange' needs a hinge, a slide or a tendon"]);
 }
 
 /// An unsupported default is refused where an element uses it, and only there.

@@ -59,6 +59,7 @@ fn force_and_slope<T: Real>(
                 let gear = T::splat(*gear);
                 (gear * forces.tendon_length[*index], gear * forces.tendon_velocity[*index])
             }
+            TransmissionSpec::Drive(drive) => (forces.drives.length[*drive], forces.drives.velocity[*drive]),
         };
         let (g, b) = (&actuator.gain, &actuator.bias);
         let gain = T::splat(g[2]).mul_add(velocity, T::splat(g[1]).mul_add(length, T::splat(g[0])));
@@ -113,6 +114,9 @@ fn share_tendons<T: Real>(sim: &Sim<T>, group: &Group<T>, forces: &mut Forces<T>
 #[inline(always)]
 pub(crate) fn actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     let forces = &mut work.forces;
+    if !sim.drives.is_empty() {
+        forces.drives.copy_from(&work.drives);
+    }
     share_tendons(sim, group, forces);
     let limited = !sim.joint_force_ranges.is_empty();
     if limited {
@@ -153,6 +157,12 @@ pub(crate) fn actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
                     let sum = &mut forces.minus_tendon_deriv[*index];
                     *sum = (gear * gear).neg_mul_add(slope, *sum);
                 }
+            }
+            TransmissionSpec::Drive(drive) => {
+                for (dof, arm) in forces.drives.arms(sim, *drive) {
+                    qfrc[dof] = force.mul_add(arm, qfrc[dof]);
+                }
+                forces.minus_drive_deriv[*drive] = -slope;
             }
         }
     }

@@ -2,6 +2,7 @@
 
 mod actuation;
 mod articulated;
+mod drive;
 mod external;
 mod kinematics;
 mod passive;
@@ -9,6 +10,7 @@ mod string;
 
 pub(crate) use actuation::{actuation, advance_activations};
 pub(crate) use articulated::{accelerate, bring_inward, factorize, link_accelerations, reduce_free_root};
+pub(crate) use drive::measure_drives;
 pub(crate) use external::link_forces;
 pub(crate) use kinematics::{kinematics, velocities};
 pub(crate) use passive::{joint_passive, measure_tendons, tendon_passive};

@@ -78,7 +78,7 @@ pub(crate) fn compile(root: &Element, file: &ReadFile, room: &Room) -> Result<Mo
     model.pairs = contact::pairs(root, &defaults, &names, &model.geoms)?;
     model.excludes = contact::excludes(root, &names)?;
     mesh::add(&mut model, &assets.meshes, room)?;
-    actuator::compile(root, &defaults, &names, &settings, &mut model)?;
+    actuator::compile(root, &defaults, &names, &settings, &mut model, room)?;
     model.sensors = sensor::compile(root, &names, &model, room)?;
     model.keyframes = custom::keyframes(root, &model, room)?;
 
@@ -91,7 +91,7 @@ pub(crate) fn compile(root: &Element, file: &ReadFile, room: &Room) -> Result<Mo
         .map_err(|e| bodies[e.body()].element.invalid(e.to_string()))?;
     statistics::compute(&mut model, &pose, &mass_matrix.diagonal, &given);
     mass_matrix::tendon_inverse_weights(&mut model, &mass_matrix, &moments);
-    actuator::resolve_damping(&mut model, &mass_matrix, &moments);
+    actuator::resolve_damping(&mut model, &pose, &mass_matrix, &moments);
     spring_dampers(&mut model, &bodies);
     check_finite(&model, &bodies)?;
     Ok(model)

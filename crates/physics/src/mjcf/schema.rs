@@ -281,19 +281,20 @@ const EQUALITY: &[Rule] = &[
 /// Attributes of every actuator that have an effect only with something that is refused.
 macro_rules! actuator_ignores {
     () => {
-        "cranklength group interp lengthrange user"
+        "group interp lengthrange user"
     };
 }
-/// Attributes of every actuator that are refused: other transmissions, and delay.
+/// Attributes of every actuator that are refused: delay.
 macro_rules! actuator_refuses {
     () => {
-        "delay=0 nsample=0 site refsite slidersite cranksite"
+        "delay=0 nsample=0"
     };
 }
 /// Attributes of every actuator that are read.
 macro_rules! actuator_reads {
     () => {
-        "name class joint jointinparent tendon gear ctrllimited ctrlrange forcelimited forcerange damping armature"
+        "name class joint jointinparent tendon site refsite cranksite slidersite cranklength gear ctrllimited ctrlrange \
+         forcelimited forcerange damping armature"
     };
 }
 /// The reason for refusing other actuators.

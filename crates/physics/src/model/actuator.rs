@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Target of an actuator's force (MuJoCo `actuator_trntype`, `actuator_trnid`).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Transmission {
     /// A joint, by index. The torque on a ball joint and the wrench on a free joint are given in the body's frame.
     Joint(usize),
@@ -11,6 +11,23 @@ pub enum Transmission {
     JointInParent(usize),
     /// A tendon, by index.
     Tendon(usize),
+    /// A site. Force and torque act at the site, along the axes of the reference site, which takes their opposites.
+    /// Without a reference they are along the site's own axes, and the length is 0.
+    Site {
+        /// The site, by index.
+        site: usize,
+        /// The reference site, if any.
+        reference: Option<usize>,
+    },
+    /// A rod from a site to a slider, which moves along the z axis of another site. The length is the slider's position.
+    SliderCrank {
+        /// The site at the end of the crank.
+        crank: usize,
+        /// The site on whose z axis the slider moves.
+        slider: usize,
+        /// Length of the rod, m.
+        rod: f64,
+    },
 }
 
 /// How an actuator's activation follows its control (MuJoCo `actuator_dyntype`, `actuator_dynprm`).
@@ -40,7 +57,8 @@ pub struct Actuator {
     pub name: String,
     /// Target of the force.
     pub transmission: Transmission,
-    /// Transmission ratio per degree of freedom of the joint. A tendon only has the first.
+    /// Transmission ratio per degree of freedom of the joint, or per axis of force and torque at a site. Tendons and
+    /// slider-cranks only have the first.
     pub gear: [f64; 6],
     /// Whether `ctrl` is clamped to `ctrl_range`.
     pub ctrl_limited: bool,
@@ -72,7 +90,21 @@ impl Actuator {
     pub fn joint(&self) -> Option<usize> {
         match self.transmission {
             Transmission::Joint(joint) | Transmission::JointInParent(joint) => Some(joint),
-            Transmission::Tendon(_) => None,
+            Transmission::Tendon(_) | Transmission::Site { .. } | Transmission::SliderCrank { .. } => None,
         }
+    }
+
+    /// The sites of a transmission between two bodies: the one that takes the opposite force first, if any.
+    pub(crate) fn sites(&self) -> Option<(Option<usize>, usize)> {
+        match self.transmission {
+            Transmission::Site { site, reference } => Some((reference, site)),
+            Transmission::SliderCrank { crank, slider, .. } => Some((Some(slider), crank)),
+            Transmission::Joint(_) | Transmission::JointInParent(_) | Transmission::Tendon(_) => None,
+        }
+    }
+
+    /// Whether the force depends on the velocity of the transmission.
+    pub(crate) fn damps(&self) -> bool {
+        self.gain[2] != 0.0 || self.bias[2] != 0.0
     }
 }

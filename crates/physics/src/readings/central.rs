@@ -265,6 +265,11 @@ impl<T: Real> Kernel<T> for Actuation<'_, T> {
                         work.readings.qfrc_actuator[dof] = pull.mul_add(arm, work.readings.qfrc_actuator[dof]);
                     }
                 }
+                TransmissionSpec::Drive(drive) => {
+                    for (dof, arm) in work.forces.drives.arms(sim, *drive) {
+                        work.readings.qfrc_actuator[dof] = force.mul_add(arm, work.readings.qfrc_actuator[dof]);
+                    }
+                }
             }
         }
         for (dof, low, high) in &sim.joint_force_ranges {

@@ -55,6 +55,10 @@ impl<T: Real> Readings<'_, T> {
             Transmission::Tendon(t) => return [self.tendon_length(t) * gear[0], self.tendon_velocity(t) * gear[0]],
             Transmission::Joint(j) => (&m.joints[j], false),
             Transmission::JointInParent(j) => (&m.joints[j], true),
+            Transmission::Site { .. } | Transmission::SliderCrank { .. } => {
+                let drive = self.sim.drives.iter().position(|d| d.actuator == actuator).unwrap_or_default();
+                return [self.work.drives.length[drive], self.work.drives.velocity[drive]];
+            }
         };
         let (q, d) = (joint.qpos_adr, joint.dof_adr);
         let rate = |d: usize| [self.group.qvel[d], self.group.qvel[d + 1], self.group.qvel[d + 2]];
@@ -80,7 +84,7 @@ impl<T: Real> Readings<'_, T> {
         }
     }
 
-    /// Total force of all actuators on a hinge or slide, including those that pull its tendons. `None` if gravity
+    /// Total force of all actuators on a hinge or slide, including those that act through tendons and sites. `None` if gravity
     /// compensation counts as one of them.
     #[inline(always)]
     pub(super) fn joint_actuator_force(&self, joint: usize) -> Option<T> {
@@ -108,9 +112,16 @@ impl<T: Real> Readings<'_, T> {
                     TendonKind::Fixed(terms) => terms.iter().find(|(j, _)| *j == joint).map_or(0.0, |(_, c)| *c),
                     TendonKind::Spatial(_) => 0.0,
                 },
+                // below
+                Transmission::Site { .. } | Transmission::SliderCrank { .. } => 0.0,
             };
             if lever != 0.0 {
                 sum = T::lit(lever * a.gear[0]).mul_add(self.work.forces.actuator_force[i], sum);
+            }
+        }
+        for (i, drive) in self.sim.drives.iter().enumerate() {
+            for (_, arm) in self.work.forces.drives.arms(self.sim, i).filter(|(dof, _)| *dof == one.dof_adr) {
+                sum = arm.mul_add(self.work.forces.actuator_force[drive.actuator], sum);
             }
         }
         if let Some([low, high]) = one.actuator_force_range {

@@ -10,6 +10,8 @@ pub(crate) enum TransmissionSpec<C> {
     Joint { dofs: std::ops::Range<usize>, qpos: usize, gear: [C; 6] },
     /// A tendon, and the gear.
     Tendon { index: usize, gear: C },
+    /// A drive, which has its own gears.
+    Drive(usize),
 }
 
 /// An actuator.
@@ -44,7 +46,8 @@ pub(super) fn actuators<T: Real>(model: &Model) -> Vec<ActuatorSpec<T::Scalar>> 
     let c = T::scalar;
     let flags = &model.opt.flags;
     let range = |on: bool, r: &[f64; 2]| on.then(|| (c(r[0]), c(r[1])));
-    let spec = |a: &Actuator| {
+    let mut drives = 0..;
+    let mut spec = |a: &Actuator| {
         let transmission = match a.transmission {
             Transmission::Joint(j) | Transmission::JointInParent(j) => {
                 let joint = &model.joints[j];
@@ -52,6 +55,10 @@ pub(super) fn actuators<T: Real>(model: &Model) -> Vec<ActuatorSpec<T::Scalar>> 
                 TransmissionSpec::Joint { dofs, qpos: joint.qpos_adr, gear: a.gear.map(c) }
             }
             Transmission::Tendon(index) => TransmissionSpec::Tendon { index, gear: c(a.gear[0]) },
+            // the drives are in the order of their actuators
+            Transmission::Site { .. } | Transmission::SliderCrank { .. } => {
+                TransmissionSpec::Drive(drives.next().unwrap_or_default())
+            }
         };
         let (dt, tiny) = (model.opt.timestep, 1e-15);
         let rate = match a.dynamics {
@@ -83,7 +90,7 @@ pub(super) fn actuators<T: Real>(model: &Model) -> Vec<ActuatorSpec<T::Scalar>> 
             }),
         }
     };
-    if flags.actuation { model.actuators.iter().map(spec).collect() } else { Vec::new() }
+    if flags.actuation { model.actuators.iter().map(&mut spec).collect() } else { Vec::new() }
 }
 
 /// Bounds of the total actuator force on a degree of freedom.

@@ -73,7 +73,7 @@ fn actuator(model: &Model, a: &Actuator) -> Refusal {
     let name = &a.name;
     let affine = a.gain[1..] != [0.0; 2] || a.bias[1..] != [0.0; 2];
     match a.transmission {
-        Transmission::Tendon(_) => {}
+        Transmission::Tendon(_) | Transmission::Site { .. } | Transmission::SliderCrank { .. } => {}
         Transmission::Joint(j) | Transmission::JointInParent(j) => {
             let joint = &model.joints[j];
             let scalar = matches!(joint.kind, JointType::Hinge | JointType::Slide);

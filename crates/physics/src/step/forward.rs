@@ -169,6 +169,9 @@ impl<T: Real> Sim<T> {
         if !self.strings.is_empty() {
             measure_strings(self, group, work);
         }
+        if !self.drives.is_empty() {
+            measure_drives(self, group, work);
+        }
     }
 
     /// Like [`Sim::refresh`], including the forces of the actuators.

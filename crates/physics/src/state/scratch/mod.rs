@@ -3,6 +3,7 @@
 mod capped;
 mod contacts;
 mod dof;
+mod drives;
 mod forces;
 mod motion;
 mod readings;
@@ -14,6 +15,7 @@ mod strings;
 pub(crate) use capped::Capped;
 pub(crate) use contacts::GeomContacts;
 pub(crate) use dof::DofWork;
+pub(crate) use drives::Drives;
 pub(crate) use forces::Forces;
 pub(crate) use motion::Motion;
 pub(crate) use readings::Measured;
@@ -36,6 +38,7 @@ pub struct Work<T: Real> {
     pub(crate) dofs: Vec<DofWork<T>>,
     pub(crate) forces: Forces<T>,
     pub(crate) strings: Strings<T>,
+    pub(crate) drives: Drives<T>,
     pub(crate) damped_tendons: DampedTendons<T>,
     pub(crate) solver: Solver<T>,
     pub(crate) contacts: GeomContacts<T>,
@@ -63,6 +66,7 @@ impl<T: Real> Work<T> {
             dofs: vec![DofWork::new(); sim.model.nv],
             forces: Forces::new(sim),
             strings: Strings::new(sim),
+            drives: Drives::new(sim),
             damped_tendons: DampedTendons::new(sim),
             solver: Solver::new(sim),
             contacts: GeomContacts::new(sim),
