@@ -1,6 +1,7 @@
-//! Actuators at sites and slider-cranks act as in MuJoCo.
+//! Actuators at sites, slider-cranks and muscles act as in MuJoCo.
 //!
-//! Small models move under every kind of actuator on these targets, with every integrator. Double precision follows
+//! Small models move under every kind of actuator on these targets and under muscles on any target, with every
+//! integrator. Double precision follows
 //! MuJoCo's states, sensors, accelerations and actuator forces every ten steps. From MuJoCo's states, the other lane
 //! types find the same accelerations up to their rounding.
 
@@ -124,6 +125,51 @@ const CASES: &[Case] = &[
             arms!(
                 r#"</worldbody><default><joint actuatorfrcrange="-1 2"/></default><actuator><motor site="tip" gear="0 0 1"/>
                 <motor joint="right"/></actuator><sensor><jointactuatorfrc joint="right"/><jointactuatorfrc joint="hand"/></sensor>"#
+            ),
+        )
+    },
+    Case {
+        ctrl: &[0.8, 0.3, 1.5, 0.6, 0.5, -0.4],
+        qvel: &[3.0, -2.0, 4.0, 0.5, 0.2, -1.0],
+        steps: 600,
+        ..case(
+            "muscles",
+            arms!(
+                r#"</worldbody><compiler><lengthrange uselimit="true"/></compiler><tendon><spatial name="s" limited="true" range="0.1 0.6"><site site="post"/><site site="elbow"/></spatial>
+                <fixed name="f"><joint joint="right" coef="1"/><joint joint="hand" coef="-0.4"/></fixed></tendon><actuator>
+                <muscle name="a" joint="right" force="8" lengthrange="-1.5 1"/><muscle name="b" tendon="s" force="30" tausmooth="0.3" timeconst="0.05 0.1"/>
+                <muscle name="c" tendon="f" scale="20" lengthrange="-0.4 0.2" vmax="3" gear="1.2"/>
+                <general name="d" joint="hand" dyntype="muscle" dynprm="0.02 0.1" gaintype="muscle" gainprm="0.7 1.2 4 1 0.3 1.9 5 1 1.5"
+                 biastype="affine" biasprm="0.1 -1 -0.02" lengthrange="-2 2"/>
+                <general name="e" site="tip" refsite="post" gear="1 0 1" gaintype="affine" gainprm="1 2 0" biastype="muscle" biasprm="0.7 1.2 4 1 0.3 1.4 5 1 1.5"
+                 lengthrange="-0.5 0.1"/>
+                <muscle name="g" cranksite="tip" slidersite="hub" cranklength="1" force="3" lengthrange="-1.3 -0.9"/></actuator>
+                <sensor><actuatorfrc actuator="a"/><actuatorfrc actuator="b"/><actuatorfrc actuator="c"/><actuatorfrc actuator="d"/>
+                <actuatorfrc actuator="e"/><actuatorfrc actuator="g"/><actuatorpos actuator="c"/></sensor>"#
+            ),
+        )
+    },
+    Case {
+        ctrl: &[0.9, 1.0, 0.5, 0.8],
+        qvel: &[3.0, -2.0, 4.0, 0.5, 0.2, -1.0],
+        ..case(
+            "implicitfast with muscles",
+            arms!(
+                r#"</worldbody><option integrator="implicitfast" timestep="0.005"/><tendon><spatial name="s"><site site="post"/><site site="elbow"/></spatial></tendon>
+                <actuator><muscle joint="right" force="20" lengthrange="-1.5 1" vmax="0.8" timeconst="0.01 0.02"/>
+                <muscle tendon="s" force="50" lengthrange="0.2 0.7" vmax="1"/>
+                <general site="tip" refsite="hub" gear="1 0 0" gaintype="muscle" gainprm="0.7 1.2 20 1 0.3 1.9 2 1 1.5" lengthrange="-0.2 0.5"/>
+                <general joint="hand" gaintype="muscle" gainprm="0.7 1.2 6 1 0.3 1.9 2 1 1.5" lengthrange="-2 2" forcerange="-2 0.1"/></actuator>"#
+            ),
+        )
+    },
+    Case {
+        ctrl: &[0.7, 1.0],
+        ..case(
+            "Runge-Kutta with muscles",
+            arms!(
+                r#"</worldbody><option integrator="RK4"/><actuator><muscle joint="right" force="20" lengthrange="-1.5 1" tausmooth="0.1"/>
+                <general joint="hand" dyntype="muscle" dynprm="0.03 0.05" gainprm="0.5" actlimited="true" actrange="0 0.6" actearly="true"/></actuator>"#
             ),
         )
     },

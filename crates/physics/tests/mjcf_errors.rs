@@ -170,16 +170,15 @@ fn what_is_not_supported_is_refused_by_name() {
         ("<tendon><spatial springyield='1'/></tendon>", &["<spatial> attribute 'springyield'"]),
         ("<deformable><flex/></deformable>", &["<flex>: deformable bodies"]),
         ("<extension><plugin><instance/></plugin></extension>", &["plugins are not supported"]),
-        ("<actuator><muscle joint='j'/></actuator>", &["<muscle>: only the actuators motor"]),
+        ("<actuator><muscle joint='j'/></actuator>", &["<muscle> attribute 'lengthrange'", "give two numbers"]),
         ("<actuator><general body='b'/></actuator>", &["<general> attribute 'body'"]),
         ("<actuator><motor joint='j' delay='.1' nsample='2'/></actuator>", &["<motor> attribute 'delay'", "only '0'"]),
         ("<actuator><pid joint='j'/></actuator>", &["<pid>: only the actuators motor"]),
         (
-            "<actuator><general joint='j' dyntype='muscle'/></actuator>",
+            "<actuator><general joint='j' dyntype='dcmotor'/></actuator>",
             &["attribute 'dyntype'", "only none, integrator"],
         ),
-        ("<actuator><general joint='j' gaintype='muscle'/></actuator>", &["attribute 'gaintype'"]),
-        ("<actuator><general joint='j' gainprm='1 2 3 4'/></actuator>", &["only the first three"]),
+        ("<actuator><general joint='j' gaintype='user'/></actuator>", &["attribute 'gaintype'"]),
         ("<keyframe><key plastic='1'/></keyframe>", &["<key> attribute 'plastic'"]),
         ("<option actuatorgroupdisable='1'/>", &["<option> attribute 'actuatorgroupdisable'"]),
         ("<option integrator='discrete'/>", &["'discrete' is not supported; use Euler or RK4"]),
@@ -513,6 +512,43 @@ fn sites_of_actuators() {
     check(&with_section(servo), &["'inheritrange' needs a hinge, a slide or a tendon"]);
 }
 
+/// Numbers of muscles.
+#[test]
+fn muscles() {
+    let muscle = |attributes: &str| {
+        with_section(&format!("<actuator><muscle joint='j' lengthrange='0 1' {attributes}/></actuator>"))
+    };
+    Model::from_xml_str(&muscle("force='0' range='0.5 0.6' tausmooth='1'"), "muscle.xml").expect("a muscle");
+    for (attributes, expected) in [
+        ("range='1 1'", "the range of the muscle goes from 1 to 1; the first must be smaller"),
+        ("lmin='1'", "lmin is 1 and lmax is 1.6; 1 must be between them"),
+        ("lmax='1'", "lmin is 0.5 and lmax is 1; 1 must be between them"),
+        ("scale='0'", "scale of the muscle is 0; it must be positive"),
+        ("vmax='0'", "vmax of the muscle is 0; it must be positive"),
+        ("fpmax='0'", "fpmax of the muscle is 0; it must be positive"),
+        ("fvmax='0'", "fvmax of the muscle is 0; it must be positive"),
+        ("tausmooth='-1'", "tausmooth must not be negative"),
+        ("force='1 2'", "'force'"),
+        ("site='s'", "<muscle> has no attribute 'site'"),
+    ] {
+        check(&muscle(attributes), &[expected]);
+    }
+    let limited = |compiler: &str, joint: &str| {
+        format!(
+            "<mujoco><compiler><lengthrange {compiler}/></compiler><worldbody><body><joint name='j' {joint}/><geom size='1'/></body>\
+             </worldbody><actuator><muscle joint='j'/></actuator></mujoco>"
+        )
+    };
+    for (compiler, joint) in [("uselimit='true'", "range='0 1'"), ("mode='none'", "")] {
+        Model::from_xml_str(&limited(compiler, joint), "limited.xml").expect("a muscle");
+    }
+    let class = "<default><muscle lengthrange='0 1'/></default><actuator><muscle joint='j'/></actuator>";
+    check(&with_section(class), &["<muscle> has no attribute 'lengthrange'"]);
+    for (compiler, joint) in [("uselimit='true'", ""), ("", "range='0 1'")] {
+        check(&limited(compiler, joint), &["<muscle> attribute 'lengthrange'", "uselimit"]);
+    }
+}
+
 /// An unsupported default is refused where an element uses it, and only there.
 #[test]
 fn unsupported_defaults_are_refused_where_they_are_used() {
@@ -529,7 +565,7 @@ fn unsupported_defaults_are_refused_where_they_are_used() {
         "<dcmotor motorconst='1' resistance='2'/>",
         "<pid kp='5'/>",
         "<orientation kp='5'/>",
-        "<general gaintype='muscle' biastype='muscle' dyntype='muscle'/>",
+        "<general gaintype='user' biastype='user' dyntype='user'/>",
         "<general input='ff'/>",
         "<tendon springyield='1'/>",
         "<pair adhesion='1'/>",
@@ -539,11 +575,12 @@ fn unsupported_defaults_are_refused_where_they_are_used() {
         let message = Model::from_xml_str(&with(unused, "", motor), "motor.xml").map_err(|e| e.to_string());
         assert!(message.is_ok() || unused.contains("delay"), "{unused}: {message:?}");
     }
-    check(&with("<muscle force='5'/>", "", general), &["<muscle>: only the actuators motor"]);
+    check(&with("<pid kp='5'/>", "", general), &["<pid>: only the actuators motor"]);
     check(
-        &with("<general gaintype='muscle'/>", "", general),
-        &["<general> attribute 'gaintype'", "constant and affine"],
+        &with("<general gaintype='user'/>", "", general),
+        &["<general> attribute 'gaintype'", "constant and affine laws and muscles"],
     );
+    check(&with("<muscle force='5'/>", "", general), &["<general> attribute 'lengthrange'"]);
     check(&with("<general input='pos vel'/>", "", general), &["'input'", "only one input"]);
     check(&with("<general delay='1'/>", "", motor), &["<general> attribute 'delay'", "'1' is not supported, only '0'"]);
     check(&with("<muscle delay='1'/>", "", motor), &["<muscle> attribute 'delay'"]);

@@ -42,7 +42,11 @@ fn force_and_slope<T: Real>(
         None => u,
         Some(a) => {
             let act = group.act[a.index];
-            let rate = a.rate.map_or(u, |r| (u - act) * T::splat(r));
+            let rate = match (&a.rate, &a.muscle) {
+                (Some(r), _) => (u - act) * T::splat(*r),
+                (None, Some(muscle)) => muscle.rate(u, act),
+                (None, None) => u,
+            };
             forces.act_dot[a.index] = rate;
             if a.early { a.next(act, rate) } else { act }
         }
@@ -66,6 +70,14 @@ fn force_and_slope<T: Real>(
         let bias = T::splat(b[2]).mul_add(velocity, T::splat(b[1]).mul_add(length, T::splat(b[0])));
         force = input.mul_add(gain, bias);
         slope = T::splat(g[2]).mul_add(input, T::splat(b[2]));
+        if let Some(muscle) = &actuator.gain_muscle {
+            let (gain, gain_slope) = muscle.gain(length, velocity);
+            force = input.mul_add(gain, force);
+            slope = gain_slope.mul_add(input, slope);
+        }
+        if let Some(muscle) = &actuator.bias_muscle {
+            force += muscle.bias(length);
+        }
     }
     (force, slope)
 }

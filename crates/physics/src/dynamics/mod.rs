@@ -5,6 +5,7 @@ mod articulated;
 mod drive;
 mod external;
 mod kinematics;
+mod muscle;
 mod passive;
 mod string;
 

@@ -1,4 +1,4 @@
-//! `<actuator>`: motors and servos on joints, tendons and sites.
+//! `<actuator>`: motors, servos and muscles on joints, tendons and sites.
 
 use super::actuator_params::{ActuatorParams, Limits};
 use super::defaults::Defaults;
@@ -7,6 +7,7 @@ use super::error::MjcfError;
 use super::limit::{check_limit, is_limited};
 use super::mass_matrix::MassMatrix;
 use super::math::MIN_VAL;
+use super::muscle;
 use super::names::Registry;
 use super::pose::Pose;
 use super::room::Room;
@@ -14,7 +15,7 @@ use super::settings::{Settings, entries};
 use super::tendon::Moments;
 use super::transmission;
 use super::value::{Attrs, Tristate, polynomial};
-use crate::model::{Actuator, Dynamics, JointType, Model, Transmission};
+use crate::model::{Actuator, Dynamics, JointType, Model, Muscle, Transmission};
 
 /// All elements of `<actuator>` sections.
 pub(crate) fn elements(root: &Element) -> impl Iterator<Item = &Element> {
@@ -41,8 +42,10 @@ fn read(attrs: &Attrs, ends: &[usize]) -> Result<Actuator, MjcfError> {
         ctrl_range,
         force_limited: is_limited(attrs, "forcelimited", force_range)?,
         force_range,
-        gain: params.gain,
-        bias: params.bias,
+        gain: params.gain(),
+        bias: params.bias(),
+        gain_muscle: None,
+        bias_muscle: None,
         dynamics: params.dynamics(),
         act: None,
         act_limited: applies(act_limited, act_range),
@@ -95,6 +98,12 @@ fn actuator(
     let Limits { ctrl_limited, act_limited, .. } = Limits::read(attrs)?;
     check_range(attrs, ("ctrllimited", ctrl_limited), ("ctrlrange", actuator.ctrl_range), settings)?;
     check_range(attrs, ("actlimited", act_limited), ("actrange", actuator.act_range), settings)?;
+    let muscles = ActuatorParams::compile(attrs, ends)?.muscles();
+    if muscles.iter().any(Option::is_some) {
+        let range = settings.lengthrange.of(attrs, actuator.transmission, model)?;
+        let of = |numbers: Option<_>| numbers.map(|n| muscle::muscle(element, &n, range)).transpose();
+        (actuator.gain_muscle, actuator.bias_muscle) = (of(muscles[0])?, of(muscles[1])?);
+    }
     let stateful = actuator.dynamics != Dynamics::None;
     if actuator.act_limited && !stateful {
         return Err(element.invalid("there is a range of activations, but no activation: dyntype is none"));
@@ -195,12 +204,23 @@ fn reflect(attrs: &Attrs, actuator: &Actuator, model: &mut Model) -> Result<(), 
     Ok(())
 }
 
-/// Turns damping ratios of position servos into damping.
+/// Turns damping ratios of position servos into damping, and scales of muscles into forces.
 ///
 /// Critical damping is `2 sqrt(kp m)`, where `1/m` is the inverse mass seen through the gear. Source: MuJoCo,
-/// `dampratio`.
-pub(crate) fn resolve_damping(model: &mut Model, pose: &Pose, mass: &MassMatrix, tendons: &Moments) {
+/// `dampratio`. A muscle without a force has its scale over the acceleration that a unit of its force causes.
+pub(crate) fn resolve(model: &mut Model, pose: &Pose, mass: &MassMatrix, tendons: &Moments) {
     for i in 0..model.actuators.len() {
+        let actuator = &model.actuators[i];
+        let scaled = |m: &Option<Muscle>| m.is_some_and(|m| m.force < 0.0);
+        if scaled(&actuator.gain_muscle) || scaled(&actuator.bias_muscle) {
+            let acceleration = mass.inverse_norm(&transmission::moments(model, pose, actuator, tendons)).max(MIN_VAL);
+            let actuator = &mut model.actuators[i];
+            for muscle in [&mut actuator.gain_muscle, &mut actuator.bias_muscle].into_iter().flatten() {
+                if muscle.force < 0.0 {
+                    muscle.force = -muscle.force / acceleration;
+                }
+            }
+        }
         let actuator = &model.actuators[i];
         let (kp, ratio) = (actuator.gain[0], actuator.bias[2]);
         if kp != -actuator.bias[1] || ratio <= 0.0 {

@@ -75,8 +75,8 @@ const TOP: &[Rule] = &[
         ),
         &[rule(
             "lengthrange",
-            "",
-            "accel interval inttotal maxforce mode timeconst timestep tolrange useexisting uselimit",
+            "mode useexisting uselimit",
+            "accel interval inttotal maxforce timeconst timestep tolrange",
             "",
         )],
     ),
@@ -281,7 +281,7 @@ const EQUALITY: &[Rule] = &[
 /// Attributes of every actuator that have an effect only with something that is refused.
 macro_rules! actuator_ignores {
     () => {
-        "group interp lengthrange user"
+        "group interp user"
     };
 }
 /// Attributes of every actuator that are refused: delay.
@@ -290,16 +290,22 @@ macro_rules! actuator_refuses {
         "delay=0 nsample=0"
     };
 }
-/// Attributes of every actuator that are read.
+/// Attributes of every actuator that are read, but for those of sites.
+macro_rules! muscle_reads {
+    () => {
+        "name class joint jointinparent tendon cranksite slidersite cranklength gear ctrllimited ctrlrange forcelimited \
+         forcerange lengthrange damping armature"
+    };
+}
+/// Attributes of every actuator but the muscle that are read.
 macro_rules! actuator_reads {
     () => {
-        "name class joint jointinparent tendon site refsite cranksite slidersite cranklength gear ctrllimited ctrlrange \
-         forcelimited forcerange damping armature"
+        concat!(muscle_reads!(), " site refsite")
     };
 }
 /// The reason for refusing other actuators.
 pub(crate) const NO_ACTUATOR: &str =
-    "only the actuators motor, position, velocity, intvelocity, damper, cylinder and general are supported";
+    "only the actuators motor, position, velocity, intvelocity, damper, cylinder, muscle and general are supported";
 const ACTUATOR: &[Rule] = &[
     rule(
         "general",
@@ -335,7 +341,12 @@ const ACTUATOR: &[Rule] = &[
     ),
     refused("orientation", NO_ACTUATOR),
     refused("pid", NO_ACTUATOR),
-    refused("muscle", NO_ACTUATOR),
+    rule(
+        "muscle",
+        concat!(muscle_reads!(), " timeconst tausmooth range force scale lmin lmax vmax fpmax fvmax"),
+        actuator_ignores!(),
+        actuator_refuses!(),
+    ),
     refused("adhesion", NO_ACTUATOR),
     refused("dcmotor", NO_ACTUATOR),
     NO_PLUGIN,
@@ -461,8 +472,7 @@ fn descend(parent: &Element, rules: &'static [Rule]) -> Result<(), MjcfError> {
 }
 
 /// Attributes that belong to one element and not to a class.
-const NOT_IN_CLASSES: &str =
-    "name class target joint jointinparent tendon geom1 geom2 site refsite slidersite cranksite body";
+const NOT_IN_CLASSES: &str = "name class target joint jointinparent tendon geom1 geom2 site refsite slidersite cranksite body lengthrange tausmooth";
 
 /// Elements that set defaults, apart from actuators and elements with their own rules.
 const DEFAULTS: [&str; 8] = ["joint", "geom", "site", "camera", "light", "pair", "material", "texture"];

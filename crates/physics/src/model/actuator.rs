@@ -47,6 +47,38 @@ pub enum Dynamics {
         /// Seconds.
         time_constant: f64,
     },
+    /// A muscle's activation follows its control, which is clamped to 0 to 1, faster up than down.
+    Muscle {
+        /// Time constant of activation, s.
+        activation: f64,
+        /// Time constant of deactivation, s.
+        deactivation: f64,
+        /// Width of the transition between the two, in units of the control; 0: none.
+        smoothing: f64,
+    },
+}
+
+/// Force of a muscle over its length and velocity (MuJoCo `gainprm`, `biasprm` and `actuator_lengthrange` of a muscle).
+///
+/// Lengths and velocities are in units of the optimal length, at which the muscle is strongest.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Muscle {
+    /// Shortest and longest length of the actuator, m or rad.
+    pub length_range: [f64; 2],
+    /// The same in units of the optimal length.
+    pub range: [f64; 2],
+    /// Largest active force, N.
+    pub force: f64,
+    /// Length below which there is no active force.
+    pub lmin: f64,
+    /// Length above which there is none.
+    pub lmax: f64,
+    /// Velocity of shortening at which the active force is gone, 1/s.
+    pub vmax: f64,
+    /// Passive force at `lmax`, as a part of `force`.
+    pub fpmax: f64,
+    /// Active force while the muscle lengthens fast, as a part of `force`.
+    pub fvmax: f64,
 }
 
 /// An actuator: `force = gain * input + bias`, where the input is the control or, with [`Dynamics`], the activation;
@@ -73,6 +105,10 @@ pub struct Actuator {
     pub gain: [f64; 3],
     /// Bias: `bias[0] + bias[1] * length + bias[2] * velocity`; all 0 for a motor.
     pub bias: [f64; 3],
+    /// A muscle's active force, in place of `gain`.
+    pub gain_muscle: Option<Muscle>,
+    /// A muscle's passive force, in place of `bias`.
+    pub bias_muscle: Option<Muscle>,
     /// How the activation follows the control.
     pub dynamics: Dynamics,
     /// Index of the activation in `act`, if the actuator has one (MuJoCo `actuator_actadr`).
@@ -105,6 +141,11 @@ impl Actuator {
 
     /// Whether the force depends on the velocity of the transmission.
     pub(crate) fn damps(&self) -> bool {
-        self.gain[2] != 0.0 || self.bias[2] != 0.0
+        self.gain[2] != 0.0 || self.bias[2] != 0.0 || self.gain_muscle.is_some()
+    }
+
+    /// Whether the force depends on the length or the velocity of the transmission.
+    pub(crate) fn is_fed_back(&self) -> bool {
+        self.damps() || self.gain[1] != 0.0 || self.bias[1] != 0.0 || self.bias_muscle.is_some()
     }
 }

@@ -71,7 +71,6 @@ fn tendon((index, tendon): (usize, &Tendon)) -> Refusal {
 
 fn actuator(model: &Model, a: &Actuator) -> Refusal {
     let name = &a.name;
-    let affine = a.gain[1..] != [0.0; 2] || a.bias[1..] != [0.0; 2];
     match a.transmission {
         Transmission::Tendon(_) | Transmission::Site { .. } | Transmission::SliderCrank { .. } => {}
         Transmission::Joint(j) | Transmission::JointInParent(j) => {
@@ -80,7 +79,7 @@ fn actuator(model: &Model, a: &Actuator) -> Refusal {
             if !scalar && matches!(a.transmission, Transmission::JointInParent(_)) {
                 return Some((format!("jointinparent of actuator '{name}'"), "use joint"));
             }
-            if !scalar && affine {
+            if !scalar && a.is_fed_back() {
                 let what = format!("actuator '{name}' with position or velocity feedback on joint '{}'", joint.name);
                 return Some((what, "only hinge and slide joints can be fed back"));
             }
