@@ -272,7 +272,7 @@ def actuator(m, i):
     transmission = {
         mujoco.mjtTrn.mjTRN_JOINT: "Joint", mujoco.mjtTrn.mjTRN_JOINTINPARENT: "JointInParent",
         mujoco.mjtTrn.mjTRN_TENDON: "Tendon", mujoco.mjtTrn.mjTRN_SITE: "Site",
-        mujoco.mjtTrn.mjTRN_SLIDERCRANK: "SliderCrank",
+        mujoco.mjtTrn.mjTRN_SLIDERCRANK: "SliderCrank", mujoco.mjtTrn.mjTRN_BODY: "Body",
     }.get(mujoco.mjtTrn(m.actuator_trntype[i]), "Unsupported")
     target, other = m.actuator_trnid[i]
     target = {

@@ -1,4 +1,4 @@
-//! Actuators at sites, slider-cranks and muscles act as in MuJoCo.
+//! Actuators at sites, slider-cranks, muscles and adhesion act as in MuJoCo.
 //!
 //! Small models move under every kind of actuator on these targets and under muscles on any target, with every
 //! integrator. Double precision follows
@@ -171,6 +171,30 @@ const CASES: &[Case] = &[
                 r#"</worldbody><option integrator="RK4"/><actuator><muscle joint="right" force="20" lengthrange="-1.5 1" tausmooth="0.1"/>
                 <general joint="hand" dyntype="muscle" dynprm="0.03 0.05" gainprm="0.5" actlimited="true" actrange="0 0.6" actearly="true"/></actuator>"#
             ),
+        )
+    },
+    Case {
+        ctrl: &[9.0, 3.0],
+        qvel: &[0.1, 0.2, 0.0, 0.0, 0.3, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.2, 0.5],
+        ..case(
+            "adhesion",
+            r#"<option gravity="0.5 0 -2"/><worldbody><geom type="plane" size="2 2 1" pos="0 0 -0.3"/><geom name="wall" type="box" size="1 1 0.1" pos="0 0 0.5" euler="0 4 0"/>
+            <body name="sticks" pos="0 0 0.301"><freejoint/><geom size="0.1"/><geom size="0.1" pos="0.3 0 -0.02"/><geom size="0.05" pos="0 0.3 0.05" friction="0.4"/></body>
+            <body name="rests" pos="0 1 -0.2"><freejoint/><geom type="box" size="0.2 0.1 0.1"/>
+              <body pos="0 0 0.2"><joint name="hinge" axis="1 0 0" damping="0.1"/><geom type="capsule" size="0.05" fromto="0 -0.1 0 0 0.1 0"/></body></body></worldbody>
+            <actuator><adhesion name="a" body="sticks" gain="4" ctrlrange="0 8"/><adhesion name="b" body="rests" ctrlrange="0 3" forcerange="0 2"/></actuator>
+            <sensor><actuatorfrc actuator="a"/><actuatorfrc actuator="b"/><actuatorpos actuator="a"/><jointactuatorfrc joint="hinge"/></sensor>"#,
+        )
+    },
+    Case {
+        ctrl: &[6.0, 2.0],
+        qvel: &[0.1, 0.2, 0.0, 0.0, 0.3, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.2],
+        ..case(
+            "adhesion with elliptic cones, of two bodies and of frictionless ones",
+            r#"<option cone="elliptic" integrator="implicitfast" gravity="0 0 -3"/><worldbody><geom type="plane" size="2 2 1" euler="3 0 0"/>
+            <body name="sticks" pos="0 0 0.099"><freejoint/><geom size="0.1" condim="1"/></body>
+            <body name="top" pos="0.02 0 0.299"><freejoint/><geom type="sphere" size="0.1" condim="6"/></body></worldbody>
+            <actuator><adhesion body="sticks" ctrlrange="0 8"/><general body="top" dyntype="filter" dynprm="0.1" gainprm="2"/></actuator>"#,
         )
     },
     Case {

@@ -6,8 +6,8 @@
 #[path = "common/refusal.rs"]
 mod refusal;
 
-use marathon_physics::Model;
 use marathon_physics::mjcf::MjcfErrorKind;
+use marathon_physics::{Model, Sim, SimOptions};
 
 /// The message for a model given as text.
 fn message(xml: &str) -> String {
@@ -171,7 +171,6 @@ fn what_is_not_supported_is_refused_by_name() {
         ("<deformable><flex/></deformable>", &["<flex>: deformable bodies"]),
         ("<extension><plugin><instance/></plugin></extension>", &["plugins are not supported"]),
         ("<actuator><muscle joint='j'/></actuator>", &["<muscle> attribute 'lengthrange'", "give two numbers"]),
-        ("<actuator><general body='b'/></actuator>", &["<general> attribute 'body'"]),
         ("<actuator><motor joint='j' delay='.1' nsample='2'/></actuator>", &["<motor> attribute 'delay'", "only '0'"]),
         ("<actuator><pid joint='j'/></actuator>", &["<pid>: only the actuators motor"]),
         (
@@ -510,6 +509,38 @@ fn sites_of_actuators() {
     }
     let servo = "<actuator><position site='s' inheritrange='1'/></actuator>";
     check(&with_section(servo), &["'inheritrange' needs a hinge, a slide or a tendon"]);
+}
+
+/// Contacts that an actuator pulls at.
+#[test]
+fn adhesion() {
+    for (actuator, expected) in [
+        ("<adhesion/>", "the attribute 'body' is missing"),
+        ("<adhesion body='c' ctrlrange='0 1'/>", "there is no body 'c'"),
+        ("<adhesion body='b' gain='-1' ctrlrange='0 1'/>", "gain must not be negative"),
+        ("<adhesion body='b' ctrlrange='-1 1'/>", "the control range of adhesion must not be negative"),
+        ("<adhesion body='b'/>", "'ctrlrange' goes from 0 to 0"),
+        ("<adhesion joint='j' ctrlrange='0 1'/>", "<adhesion> has no attribute 'joint'"),
+        ("<motor body='b'/>", "<motor> has no attribute 'body'"),
+    ] {
+        check(&with_section(&format!("<actuator>{actuator}</actuator>")), &[expected]);
+    }
+    let body = "<worldbody><body name='b'><joint name='j'/><geom name='g' size='1'/></body></worldbody>";
+    for (model, expected) in [
+        (
+            body.to_owned() + "<actuator><general body='b' biastype='affine' biasprm='0 0 1'/></actuator>",
+            "feedback on the contacts of body 'b'",
+        ),
+        (body.replace("size", "gap='0.1' size") + "<actuator><general body='b'/></actuator>", "with gaps"),
+        (
+            body.replace("'j'", "'j' actuatorfrcrange='-1 1'") + "<actuator><general body='b'/></actuator>",
+            "actuatorfrcrange of joint 'j'",
+        ),
+    ] {
+        let model = Model::from_xml_str(&format!("<mujoco>{model}</mujoco>"), "adhesion.xml").expect("a model");
+        let error = Sim::<f64>::new(&model, SimOptions::default()).expect_err("it is refused").to_string();
+        assert!(error.contains(expected), "{error}");
+    }
 }
 
 /// Numbers of muscles.

@@ -64,6 +64,8 @@ fn force_and_slope<T: Real>(
                 (gear * forces.tendon_length[*index], gear * forces.tendon_velocity[*index])
             }
             TransmissionSpec::Drive(drive) => (forces.drives.length[*drive], forces.drives.velocity[*drive]),
+            // nothing is fed back, but the bias may be constant
+            TransmissionSpec::Adhesion => (T::zero(), T::zero()),
         };
         let (g, b) = (&actuator.gain, &actuator.bias);
         let gain = T::splat(g[2]).mul_add(velocity, T::splat(g[1]).mul_add(length, T::splat(g[0])));
@@ -176,6 +178,8 @@ pub(crate) fn actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
                 }
                 forces.minus_drive_deriv[*drive] = -slope;
             }
+            // the contacts are not known yet
+            TransmissionSpec::Adhesion => {}
         }
     }
     if limited {

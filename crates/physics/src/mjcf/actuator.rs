@@ -194,7 +194,7 @@ fn reflect(attrs: &Attrs, actuator: &Actuator, model: &mut Model) -> Result<(), 
             let tendon = &mut model.tendons[t];
             add((&mut tendon.armature, &mut tendon.damping, &mut tendon.damping_poly));
         }
-        Transmission::Site { .. } | Transmission::SliderCrank { .. } => {
+        Transmission::Site { .. } | Transmission::SliderCrank { .. } | Transmission::Body(_) => {
             let given = [("damping", damping != 0.0 || damping_poly != [0.0; 2]), ("armature", armature != 0.0)];
             if let Some((name, _)) = given.iter().find(|(_, given)| *given) {
                 return Err(attrs.element.invalid(format!("'{name}' needs a joint or a tendon")));

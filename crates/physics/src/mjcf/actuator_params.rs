@@ -216,6 +216,13 @@ impl<'a> ActuatorParams<'a> {
                 self.activation = Activation::Filter;
             }
             "motor" => *self = ActuatorParams::GENERAL,
+            "adhesion" => {
+                let gain = attrs.number_or("gain", kept)?;
+                if gain < 0.0 {
+                    return Err(element.invalid("gain must not be negative"));
+                }
+                (self.gain, self.bias) = (three([gain, 0.0, 0.0]), [0.0; 10]);
+            }
             "muscle" => {
                 muscle::read(&attrs, &mut self.gain, &mut self.times)?;
                 self.bias = self.gain;
@@ -226,18 +233,14 @@ impl<'a> ActuatorParams<'a> {
                 *self = ActuatorParams::GENERAL;
                 let refused = Some(Refused { element, attribute: None, reason: NO_ACTUATOR });
                 self.refused[0] = refused;
-                if name == "adhesion" {
-                    self.gain[0] = attrs.number_or("gain", kept)?;
-                } else {
-                    self.refused[1] = refused;
-                }
+                self.refused[1] = refused;
                 self.element = name;
                 return Ok(());
             }
         }
         self.element = name;
         (self.gain_law, self.bias_law) = match name {
-            "motor" => (Law::Plain, Law::Plain),
+            "motor" | "adhesion" => (Law::Plain, Law::Plain),
             "damper" => (Law::Affine, Law::Plain),
             "muscle" => (Law::Muscle, Law::Muscle),
             _ => (Law::Plain, Law::Affine),
@@ -407,8 +410,10 @@ impl Limits {
         match element.name.as_str() {
             "position" if inherits => self.ctrl_range = [0.0; 2],
             "intvelocity" if inherits => self.act_range = [0.0; 2],
-            "damper" if self.ctrl_range.iter().any(|x| *x < 0.0) => {
-                return Err(element.invalid("the control range of a damper must not be negative"));
+            "damper" | "adhesion" if self.ctrl_range.iter().any(|x| *x < 0.0) => {
+                let owner = if element.name == "damper" { "a damper" } else { "adhesion" };
+                let message = format!("the control range of {owner} must not be negative");
+                return Err(element.invalid(message));
             }
             "damper" | "adhesion" => self.ctrl_limited = Tristate::True,
             _ => {}

@@ -87,7 +87,7 @@ impl LengthRange {
                 model.joints[j].limited.then_some(model.joints[j].range)
             }
             Transmission::Tendon(t) => model.tendons[t].limited.then_some(model.tendons[t].range),
-            Transmission::Site { .. } | Transmission::SliderCrank { .. } => None,
+            Transmission::Site { .. } | Transmission::SliderCrank { .. } | Transmission::Body(_) => None,
         };
         limit.filter(|_| self.limits).ok_or_else(|| {
             let reason = "the simulation that finds it is not supported; give two numbers, or set \

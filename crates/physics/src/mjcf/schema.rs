@@ -304,18 +304,18 @@ macro_rules! actuator_reads {
     };
 }
 /// The reason for refusing other actuators.
-pub(crate) const NO_ACTUATOR: &str =
-    "only the actuators motor, position, velocity, intvelocity, damper, cylinder, muscle and general are supported";
+pub(crate) const NO_ACTUATOR: &str = "only the actuators motor, position, velocity, intvelocity, damper, cylinder, muscle, adhesion and general \
+     are supported";
 const ACTUATOR: &[Rule] = &[
     rule(
         "general",
         concat!(
             actuator_reads!(),
-            " gainprm gaintype biasprm biastype dynprm dyntype actdim actearly actlimited actrange inheritrange input"
+            " gainprm gaintype biasprm biastype dynprm dyntype actdim actearly actlimited actrange inheritrange input body"
         ),
         // only unsupported laws use the inputs that these two ranges limit
         concat!(actuator_ignores!(), " ffrange velrange"),
-        concat!(actuator_refuses!(), " body"),
+        actuator_refuses!(),
     ),
     rule("motor", actuator_reads!(), actuator_ignores!(), actuator_refuses!()),
     rule(
@@ -347,7 +347,12 @@ const ACTUATOR: &[Rule] = &[
         actuator_ignores!(),
         actuator_refuses!(),
     ),
-    refused("adhesion", NO_ACTUATOR),
+    rule(
+        "adhesion",
+        "name class body gain ctrlrange forcelimited forcerange",
+        "group interp user",
+        actuator_refuses!(),
+    ),
     refused("dcmotor", NO_ACTUATOR),
     NO_PLUGIN,
 ];

@@ -1,4 +1,4 @@
-//! What an actuator acts on: a joint, a tendon, or sites.
+//! What an actuator acts on: a joint, a tendon, sites, or the contacts of a body.
 
 use super::error::MjcfError;
 use super::math::{Frame, axes, cross, dot, rotate, scale, sub};
@@ -14,10 +14,11 @@ use std::collections::BTreeMap;
 const ARM: usize = 160;
 
 /// Attributes that name the target, each with those that belong to it.
-const TARGETS: [(&str, &[&str]); 5] = [
+const TARGETS: [(&str, &[&str]); 6] = [
     ("joint", &[]),
     ("jointinparent", &[]),
     ("tendon", &[]),
+    ("body", &[]),
     ("site", &["refsite"]),
     ("cranksite", &["slidersite", "cranklength"]),
 ];
@@ -27,6 +28,7 @@ pub(crate) fn target(attrs: &Attrs, names: &Registry) -> Result<Transmission, Mj
     let element = attrs.element;
     let given: Vec<&str> = TARGETS.map(|(name, _)| name).into_iter().filter(|n| element.attr(n).is_some()).collect();
     let target = match given.as_slice() {
+        [] if element.name == "adhesion" => return Err(element.invalid("the attribute 'body' is missing")),
         [] => return Err(element.invalid("the attribute 'joint' is missing")),
         [one] => *one,
         several => return Err(element.invalid(format!("there are both '{}'", several.join("' and '")))),
@@ -41,6 +43,7 @@ pub(crate) fn target(attrs: &Attrs, names: &Registry) -> Result<Transmission, Mj
         "joint" => Transmission::Joint(names.joints.required(element, target)?),
         "jointinparent" => Transmission::JointInParent(names.joints.required(element, target)?),
         "tendon" => Transmission::Tendon(names.tendons.required(element, target)?),
+        "body" => Transmission::Body(names.bodies.required(element, target)?),
         "site" => {
             let given = element.text("refsite").is_some_and(|s| !s.is_empty());
             let reference = if given { Some(site("refsite")?) } else { None };
@@ -56,8 +59,11 @@ pub(crate) fn target(attrs: &Attrs, names: &Registry) -> Result<Transmission, Mj
     })
 }
 
-/// Takes room for the moment arms of a drive.
+/// Takes room for the moment arms of a drive, or of adhesion, which may act on everything.
 pub(crate) fn take_room(attrs: &Attrs, model: &Model, actuator: &Actuator, room: &Room) -> Result<(), MjcfError> {
+    if let Transmission::Body(_) = actuator.transmission {
+        return room.take_for(attrs.element, model.nv + model.geoms.len(), ARM);
+    }
     let Some((first, second)) = actuator.sites() else { return Ok(()) };
     let dofs = |site: usize| model.dofs_of_body(model.sites[site].body).len();
     room.take_for(attrs.element, first.map_or(0, dofs) + dofs(second) + 16, ARM)
@@ -68,6 +74,8 @@ pub(crate) fn moments(model: &Model, pose: &Pose, actuator: &Actuator, tendons: 
     let gear = actuator.gear;
     match actuator.transmission {
         Transmission::Tendon(t) => tendons[t].iter().map(|(dof, arm)| (*dof, arm * gear[0])).collect(),
+        // MuJoCo looks for no contacts there
+        Transmission::Body(_) => Vec::new(),
         Transmission::Joint(j) | Transmission::JointInParent(j) => {
             let joint = &model.joints[j];
             let mut arms = gear[..joint.kind.dofs()].to_vec();

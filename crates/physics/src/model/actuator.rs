@@ -28,6 +28,8 @@ pub enum Transmission {
         /// Length of the rod, m.
         rod: f64,
     },
+    /// The contacts of a body, by index. The force is spread over them and pulls along their normals. It has no length.
+    Body(usize),
 }
 
 /// How an actuator's activation follows its control (MuJoCo `actuator_dyntype`, `actuator_dynprm`).
@@ -90,7 +92,7 @@ pub struct Actuator {
     /// Target of the force.
     pub transmission: Transmission,
     /// Transmission ratio per degree of freedom of the joint, or per axis of force and torque at a site. Tendons and
-    /// slider-cranks only have the first.
+    /// slider-cranks only have the first, contacts none.
     pub gear: [f64; 6],
     /// Whether `ctrl` is clamped to `ctrl_range`.
     pub ctrl_limited: bool,
@@ -126,7 +128,10 @@ impl Actuator {
     pub fn joint(&self) -> Option<usize> {
         match self.transmission {
             Transmission::Joint(joint) | Transmission::JointInParent(joint) => Some(joint),
-            Transmission::Tendon(_) | Transmission::Site { .. } | Transmission::SliderCrank { .. } => None,
+            Transmission::Tendon(_)
+            | Transmission::Site { .. }
+            | Transmission::SliderCrank { .. }
+            | Transmission::Body(_) => None,
         }
     }
 
@@ -135,7 +140,10 @@ impl Actuator {
         match self.transmission {
             Transmission::Site { site, reference } => Some((reference, site)),
             Transmission::SliderCrank { crank, slider, .. } => Some((Some(slider), crank)),
-            Transmission::Joint(_) | Transmission::JointInParent(_) | Transmission::Tendon(_) => None,
+            Transmission::Joint(_)
+            | Transmission::JointInParent(_)
+            | Transmission::Tendon(_)
+            | Transmission::Body(_) => None,
         }
     }
 

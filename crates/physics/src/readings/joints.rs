@@ -55,6 +55,8 @@ impl<T: Real> Readings<'_, T> {
             Transmission::Tendon(t) => return [self.tendon_length(t) * gear[0], self.tendon_velocity(t) * gear[0]],
             Transmission::Joint(j) => (&m.joints[j], false),
             Transmission::JointInParent(j) => (&m.joints[j], true),
+            // the velocity of contacts is not evaluated
+            Transmission::Body(_) => return [T::zero(); 2],
             Transmission::Site { .. } | Transmission::SliderCrank { .. } => {
                 let drive = self.sim.drives.iter().position(|d| d.actuator == actuator).unwrap_or_default();
                 return [self.work.drives.length[drive], self.work.drives.velocity[drive]];
@@ -113,7 +115,7 @@ impl<T: Real> Readings<'_, T> {
                     TendonKind::Spatial(_) => 0.0,
                 },
                 // below
-                Transmission::Site { .. } | Transmission::SliderCrank { .. } => 0.0,
+                Transmission::Site { .. } | Transmission::SliderCrank { .. } | Transmission::Body(_) => 0.0,
             };
             if lever != 0.0 {
                 sum = T::lit(lever * a.gear[0]).mul_add(self.work.forces.actuator_force[i], sum);
@@ -123,6 +125,10 @@ impl<T: Real> Readings<'_, T> {
             for (_, arm) in self.work.forces.drives.arms(self.sim, i).filter(|(dof, _)| *dof == one.dof_adr) {
                 sum = arm.mul_add(self.work.forces.actuator_force[drive.actuator], sum);
             }
+        }
+        for (i, spec) in self.sim.adhesions.iter().enumerate() {
+            let arm = self.work.adhesion.of(self.sim, i)[one.dof_adr];
+            sum = arm.mul_add(self.work.forces.actuator_force[spec.actuator], sum);
         }
         if let Some([low, high]) = one.actuator_force_range {
             sum = sum.max(T::lit(low)).min(T::lit(high));

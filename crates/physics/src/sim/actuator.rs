@@ -13,6 +13,8 @@ pub(crate) enum TransmissionSpec<C> {
     Tendon { index: usize, gear: C },
     /// A drive, which has its own gears.
     Drive(usize),
+    /// Contacts, which are found later.
+    Adhesion,
 }
 
 /// An actuator.
@@ -64,6 +66,7 @@ pub(super) fn actuators<T: Real>(model: &Model) -> Vec<ActuatorSpec<T::Scalar>> 
             Transmission::Site { .. } | Transmission::SliderCrank { .. } => {
                 TransmissionSpec::Drive(drives.next().unwrap_or_default())
             }
+            Transmission::Body(_) => TransmissionSpec::Adhesion,
         };
         let (dt, tiny) = (model.opt.timestep, 1e-15);
         let rate = match a.dynamics {

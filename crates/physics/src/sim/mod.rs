@@ -6,6 +6,7 @@
 //! Each file prepares one kind of constant. The kernels that read it are in the folders above.
 
 mod actuator;
+mod adhesion;
 mod broad;
 mod caps;
 mod contact_params;
@@ -29,6 +30,7 @@ mod weights;
 mod weld;
 
 pub(crate) use actuator::{Activation, ActuatorSpec, TendonForceRange, TransmissionSpec};
+pub(crate) use adhesion::AdhesionSpec;
 pub(crate) use broad::Broad;
 pub(crate) use caps::Caps;
 pub(crate) use contacts::Contacts;
@@ -81,6 +83,7 @@ pub struct Sim<T: Real> {
     pub(crate) tendons: Vec<TendonSpec<T::Scalar>>,
     /// The paths of spatial tendons.
     pub(crate) strings: Vec<StringSpec<T::Scalar>>,
+    pub(crate) adhesions: Vec<AdhesionSpec>,
     /// Transmissions through sites.
     pub(crate) drives: Vec<DriveSpec<T::Scalar>>,
     /// The matrix of `implicitfast`, if tendons or drives have a share in it.
@@ -168,6 +171,7 @@ impl<T: Real> Sim<T> {
             equalities,
             tendons,
             strings,
+            adhesions: adhesion::adhesions(model),
             drives,
             damped_tendons: TreeMatrix::of_damped_tendons(model),
             gravcomp: medium::gravity_compensation::<T>(model, &mounts, &link_of),

@@ -42,7 +42,7 @@ part! {
 }
 
 part! {
-    /// An actuator on a joint, a tendon or a site.
+    /// An actuator on a joint, a tendon, a site or the contacts of a body.
     Actuator: Actuator in ModelPart {
         /// Its force is the control times `gear`.
         pub fn motor(name: &str) -> Self {
@@ -62,6 +62,12 @@ part! {
         /// Any gain and bias: `gaintype`, `gainprm`, `biastype`, `biasprm`, `dyntype`...
         pub fn general(name: &str) -> Self {
             Actuator(Draft::new("general").with("name", name))
+        }
+
+        /// Pulls a body towards what it touches. The force, the control times `gain`, is spread over the contacts.
+        pub fn adhesion(name: &str, body: &str, gain: f64, ctrl_range: [f64; 2]) -> Self {
+            let draft = Draft::new("adhesion").with("name", name).with("body", body);
+            Actuator(draft.with("gain", gain).with("ctrlrange", ctrl_range))
         }
 
         /// The joint that it moves.

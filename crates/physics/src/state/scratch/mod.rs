@@ -1,5 +1,6 @@
 //! Scratch memory of a step.
 
+mod adhesion;
 mod capped;
 mod contacts;
 mod dof;
@@ -12,6 +13,7 @@ mod slip;
 mod solver;
 mod strings;
 
+pub(crate) use adhesion::Adhesion;
 pub(crate) use capped::Capped;
 pub(crate) use contacts::GeomContacts;
 pub(crate) use dof::DofWork;
@@ -39,6 +41,7 @@ pub struct Work<T: Real> {
     pub(crate) forces: Forces<T>,
     pub(crate) strings: Strings<T>,
     pub(crate) drives: Drives<T>,
+    pub(crate) adhesion: Adhesion<T>,
     pub(crate) damped_tendons: DampedTendons<T>,
     pub(crate) solver: Solver<T>,
     pub(crate) contacts: GeomContacts<T>,
@@ -67,6 +70,7 @@ impl<T: Real> Work<T> {
             forces: Forces::new(sim),
             strings: Strings::new(sim),
             drives: Drives::new(sim),
+            adhesion: Adhesion::new(sim),
             damped_tendons: DampedTendons::new(sim),
             solver: Solver::new(sim),
             contacts: GeomContacts::new(sim),
