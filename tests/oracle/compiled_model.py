@@ -247,23 +247,46 @@ def dynamics(m, i):
     return {
         mujoco.mjtDyn.mjDYN_NONE: "None", mujoco.mjtDyn.mjDYN_INTEGRATOR: "Integrator",
         mujoco.mjtDyn.mjDYN_FILTER: {"Filter": constant}, mujoco.mjtDyn.mjDYN_FILTEREXACT: {"FilterExact": constant},
+        mujoco.mjtDyn.mjDYN_MUSCLE: {
+            "Muscle": dict(zip(("activation", "deactivation", "smoothing"), m.actuator_dynprm[i, :3]))
+        },
     }.get(mujoco.mjtDyn(m.actuator_dyntype[i]), "Unsupported")
+
+
+def muscle(m, i, numbers):
+    low, high, force, scale, lmin, lmax, vmax, fpmax, fvmax = numbers[:9]
+    out = m.actuator_outadr[i]
+    return {
+        "length_range": m.actuator_lengthrange[out], "range": [low, high],
+        "force": force if force >= 0 else scale / max(1e-15, m.actuator_acc0[out]), "lmin": lmin, "lmax": lmax,
+        "vmax": vmax, "fpmax": fpmax, "fvmax": fvmax,
+    }
 
 
 def actuator(m, i):
     affine_gain = m.actuator_gaintype[i] == mujoco.mjtGain.mjGAIN_AFFINE
     affine_bias = m.actuator_biastype[i] == mujoco.mjtBias.mjBIAS_AFFINE
+    muscle_gain = m.actuator_gaintype[i] == mujoco.mjtGain.mjGAIN_MUSCLE
+    muscle_bias = m.actuator_biastype[i] == mujoco.mjtBias.mjBIAS_MUSCLE
     gain, bias = m.actuator_gainprm[i, :3], m.actuator_biasprm[i, :3]
     transmission = {
         mujoco.mjtTrn.mjTRN_JOINT: "Joint", mujoco.mjtTrn.mjTRN_JOINTINPARENT: "JointInParent",
-        mujoco.mjtTrn.mjTRN_TENDON: "Tendon",
+        mujoco.mjtTrn.mjTRN_TENDON: "Tendon", mujoco.mjtTrn.mjTRN_SITE: "Site",
+        mujoco.mjtTrn.mjTRN_SLIDERCRANK: "SliderCrank", mujoco.mjtTrn.mjTRN_BODY: "Body",
     }.get(mujoco.mjtTrn(m.actuator_trntype[i]), "Unsupported")
+    target, other = m.actuator_trnid[i]
+    target = {
+        "Site": {"site": target, "reference": other if other >= 0 else "none"},
+        "SliderCrank": {"crank": target, "slider": other, "rod": m.actuator_cranklength[m.actuator_outadr[i]]},
+    }.get(transmission, target)
     return {
-        "name": name(m, mujoco.mjtObj.mjOBJ_ACTUATOR, i), "transmission": {transmission: m.actuator_trnid[i, 0]},
+        "name": name(m, mujoco.mjtObj.mjOBJ_ACTUATOR, i), "transmission": {transmission: target},
         "gear": m.actuator_gear[i], "ctrl_limited": bool(m.actuator_ctrllimited[i]),
         "ctrl_range": m.actuator_ctrlrange[i], "force_limited": bool(m.actuator_forcelimited[i]),
         "force_range": m.actuator_forcerange[i],
-        "gain": gain if affine_gain else [gain[0], 0, 0], "bias": bias if affine_bias else [0, 0, 0],
+        "gain": gain if affine_gain else [0 if muscle_gain else gain[0], 0, 0], "bias": bias if affine_bias else [0, 0, 0],
+        "gain_muscle": muscle(m, i, m.actuator_gainprm[i]) if muscle_gain else "none",
+        "bias_muscle": muscle(m, i, m.actuator_biasprm[i]) if muscle_bias else "none",
         "dynamics": dynamics(m, i), "act": m.actuator_actadr[i] if m.actuator_actadr[i] >= 0 else "none",
         "act_limited": bool(m.actuator_actlimited[i]), "act_range": m.actuator_actrange[i],
         "act_early": bool(m.actuator_actearly[i]),

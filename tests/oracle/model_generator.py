@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 
+import drive_generator
 import string_generator
 
 
@@ -583,7 +584,8 @@ class Generator:
                     ("equality", self.equality_section), ("contact", self.contact_section), ("sensor", self.sensor_section)]
         drawn = [(name, section()) for name, section in sections]
         strings = string_generator.sections(self, self.seed, element)
-        for name, children in [*drawn, *strings.items()]:
+        drives = drive_generator.sections(self, self.seed, element)
+        for name, children in [*drawn, *strings.items(), *drives.items()]:
             if children:
                 parts.append(element(name, {}, children))
         return "\n".join(element("mujoco", {"model": "random"}, parts)) + "\n"

@@ -91,6 +91,12 @@ fn reading_takes_time_in_proportion() {
     };
     load("a string", &strings(1000)).expect("it is not too long");
     refused("a long string", &strings(20_000), MEMORY);
+    let motors = |count: usize| {
+        let motors = "<motor site='e'/>".repeat(count);
+        world(&chain, &format!("<actuator>{motors}</actuator>"))
+    };
+    load("motors", &motors(1000)).expect("they are not too many");
+    refused("many motors", &motors(20_000), MEMORY);
 
     // one tree with a large mass matrix
     let tree = format!("<body><freejoint/><geom size='1'/>{}</body>", repeat(4000, one));

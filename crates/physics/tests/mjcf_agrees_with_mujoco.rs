@@ -253,7 +253,7 @@ fn tensor(quat: &[f64], inertia: &[f64]) -> [f64; 9] {
 /// An actuator keeps the class defaults that MuJoCo keeps, including those of unsupported actuators.
 #[test]
 fn actuators_over_defaults_of_any_kind() {
-    const DEFAULTS: [&str; 21] = [
+    const DEFAULTS: [&str; 23] = [
         r#"<muscle timeconst=".1 .2" ctrlrange="0 1" force="5"/>"#,
         r#"<adhesion gain="5" ctrlrange="0 1"/>"#,
         r#"<dcmotor motorconst="1" resistance="2"/>"#,
@@ -261,6 +261,8 @@ fn actuators_over_defaults_of_any_kind() {
         r#"<orientation kp="5"/>"#,
         r#"<general input="pos vel" gaintype="pid" biastype="affine" ctrlrange="0 1"/>"#,
         r#"<general dyntype="muscle" gaintype="muscle" biastype="muscle" gainprm="1 2 3 4 5"/>"#,
+        r#"<general gaintype="muscle" gainprm=".6 .9 3 100 .4 1.5 1.4 1.2 1.1" dyntype="filter" dynprm="3 4 5"/>"#,
+        r#"<muscle timeconst=".1 .2" scale="30"/>"#,
         r#"<general input="ff"/>"#,
         r#"<general gaintype="user" gainprm="7"/>"#,
         r#"<general biastype="user" gainprm="7"/>"#,
@@ -276,15 +278,17 @@ fn actuators_over_defaults_of_any_kind() {
         r#"<cylinder area="2" timeconst=".3"/>"#,
         r#"<intvelocity kp="3" actrange="-1 1"/>"#,
     ];
-    const SECOND: [&str; 6] = [
+    const SECOND: [&str; 8] = [
         "",
         r#"<general gainprm="20"/>"#,
         r#"<position kp="20"/>"#,
         "<motor/>",
         r#"<muscle force="3"/>"#,
         r#"<velocity kv="8"/>"#,
+        r#"<general dyntype="muscle" dynprm=".5 .6 .7"/>"#,
+        r#"<general gaintype="fixed" biastype="affine"/>"#,
     ];
-    const ACTUATORS: [&str; 9] = [
+    const ACTUATORS: [&str; 11] = [
         "motor",
         "position",
         "velocity",
@@ -294,8 +298,10 @@ fn actuators_over_defaults_of_any_kind() {
         "cylinder",
         r#"general gaintype="fixed" biastype="none" dyntype="none" input="pos""#,
         r#"position kp="4" kv="3""#,
+        "muscle",
+        r#"muscle force="3" timeconst="1 2" tausmooth="0.1""#,
     ];
-    let body = r#"<worldbody><body><joint name="j" axis="0 1 0" range="-1 1"/><geom size=".1" pos=".3 0 0"/></body></worldbody>"#;
+    let body = r#"<compiler><lengthrange uselimit="true"/></compiler><worldbody><body><joint name="j" axis="0 1 0" range="-1 1"/><geom size=".1" pos=".3 0 0"/></body></worldbody>"#;
     let mut texts = Vec::new();
     for (default, second) in DEFAULTS.iter().flat_map(|d| SECOND.iter().map(move |s| (d, s))) {
         for (outer, inner) in [(default, second), (second, default)] {

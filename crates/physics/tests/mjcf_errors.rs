@@ -6,8 +6,8 @@
 #[path = "common/refusal.rs"]
 mod refusal;
 
-use marathon_physics::Model;
 use marathon_physics::mjcf::MjcfErrorKind;
+use marathon_physics::{Model, Sim, SimOptions};
 
 /// The message for a model given as text.
 fn message(xml: &str) -> String {
@@ -170,18 +170,14 @@ fn what_is_not_supported_is_refused_by_name() {
         ("<tendon><spatial springyield='1'/></tendon>", &["<spatial> attribute 'springyield'"]),
         ("<deformable><flex/></deformable>", &["<flex>: deformable bodies"]),
         ("<extension><plugin><instance/></plugin></extension>", &["plugins are not supported"]),
-        ("<actuator><muscle joint='j'/></actuator>", &["<muscle>: only the actuators motor"]),
-        ("<actuator><motor site='s'/></actuator>", &["<motor> attribute 'site'"]),
-        ("<actuator><motor cranksite='s' slidersite='s'/></actuator>", &["<motor> attribute 'cranksite'"]),
-        ("<actuator><general body='b'/></actuator>", &["<general> attribute 'body'"]),
+        ("<actuator><muscle joint='j'/></actuator>", &["<muscle> attribute 'lengthrange'", "give two numbers"]),
         ("<actuator><motor joint='j' delay='.1' nsample='2'/></actuator>", &["<motor> attribute 'delay'", "only '0'"]),
         ("<actuator><pid joint='j'/></actuator>", &["<pid>: only the actuators motor"]),
         (
-            "<actuator><general joint='j' dyntype='muscle'/></actuator>",
+            "<actuator><general joint='j' dyntype='dcmotor'/></actuator>",
             &["attribute 'dyntype'", "only none, integrator"],
         ),
-        ("<actuator><general joint='j' gaintype='muscle'/></actuator>", &["attribute 'gaintype'"]),
-        ("<actuator><general joint='j' gainprm='1 2 3 4'/></actuator>", &["only the first three"]),
+        ("<actuator><general joint='j' gaintype='user'/></actuator>", &["attribute 'gaintype'"]),
         ("<keyframe><key plastic='1'/></keyframe>", &["<key> attribute 'plastic'"]),
         ("<option actuatorgroupdisable='1'/>", &["<option> attribute 'actuatorgroupdisable'"]),
         ("<option integrator='discrete'/>", &["'discrete' is not supported; use Euler or RK4"]),
@@ -491,6 +487,98 @@ fn what_is_no_file_is_not_read() {
     std::fs::remove_dir_all(folder).unwrap();
 }
 
+/// Sites that an actuator acts on.
+#[test]
+fn sites_of_actuators() {
+    for (motor, parts) in [
+        ("site='t'", &["there is no site 't'", "did you mean 's'?"][..]),
+        ("site='s' refsite='t'", &["there is no site 't'"]),
+        ("site='s' joint='j'", &["there are both 'joint' and 'site'"]),
+        ("joint='j' refsite='s'", &["'refsite' needs 'site', but there is 'joint'"]),
+        ("site='s' slidersite='s'", &["'slidersite' needs 'cranksite', but there is 'site'"]),
+        ("joint='j' cranklength='1'", &["'cranklength' needs 'cranksite', but there is 'joint'"]),
+        ("cranksite='s' cranklength='1'", &["the attribute 'slidersite' is missing"]),
+        ("cranksite='s' slidersite='t' cranklength='1'", &["there is no site 't'"]),
+        ("cranksite='s' slidersite='s'", &["'cranklength' is 0; it must be positive"]),
+        ("cranksite='s' slidersite='s' cranklength='-1'", &["'cranklength' is -1; it must be positive"]),
+        ("site='s' damping='1'", &["'damping' needs a joint or a tendon"]),
+        ("cranksite='s' slidersite='s' cranklength='1' armature='1'", &["'armature' needs a joint or a tendon"]),
+    ] {
+        check(&with_section(&format!("<actuator><motor {motor}/></actuator>")), parts);
+    }
+    let servo = "<actuator><position site='s' inheritrange='1'/></actuator>";
+    check(&with_section(servo), &["'inheritrange' needs a hinge, a slide or a tendon"]);
+}
+
+/// Contacts that an actuator pulls at.
+#[test]
+fn adhesion() {
+    for (actuator, expected) in [
+        ("<adhesion/>", "the attribute 'body' is missing"),
+        ("<adhesion body='c' ctrlrange='0 1'/>", "there is no body 'c'"),
+        ("<adhesion body='b' gain='-1' ctrlrange='0 1'/>", "gain must not be negative"),
+        ("<adhesion body='b' ctrlrange='-1 1'/>", "the control range of adhesion must not be negative"),
+        ("<adhesion body='b'/>", "'ctrlrange' goes from 0 to 0"),
+        ("<adhesion joint='j' ctrlrange='0 1'/>", "<adhesion> has no attribute 'joint'"),
+        ("<motor body='b'/>", "<motor> has no attribute 'body'"),
+    ] {
+        check(&with_section(&format!("<actuator>{actuator}</actuator>")), &[expected]);
+    }
+    let body = "<worldbody><body name='b'><joint name='j'/><geom name='g' size='1'/></body></worldbody>";
+    for (model, expected) in [
+        (
+            body.to_owned() + "<actuator><general body='b' biastype='affine' biasprm='0 0 1'/></actuator>",
+            "feedback on the contacts of body 'b'",
+        ),
+        (body.replace("size", "gap='0.1' size") + "<actuator><general body='b'/></actuator>", "with gaps"),
+        (
+            body.replace("'j'", "'j' actuatorfrcrange='-1 1'") + "<actuator><general body='b'/></actuator>",
+            "actuatorfrcrange of joint 'j'",
+        ),
+    ] {
+        let model = Model::from_xml_str(&format!("<mujoco>{model}</mujoco>"), "adhesion.xml").expect("a model");
+        let error = Sim::<f64>::new(&model, SimOptions::default()).expect_err("it is refused").to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+}
+
+/// Numbers of muscles.
+#[test]
+fn muscles() {
+    let muscle = |attributes: &str| {
+        with_section(&format!("<actuator><muscle joint='j' lengthrange='0 1' {attributes}/></actuator>"))
+    };
+    Model::from_xml_str(&muscle("force='0' range='0.5 0.6' tausmooth='1'"), "muscle.xml").expect("a muscle");
+    for (attributes, expected) in [
+        ("range='1 1'", "the range of the muscle goes from 1 to 1; the first must be smaller"),
+        ("lmin='1'", "lmin is 1 and lmax is 1.6; 1 must be between them"),
+        ("lmax='1'", "lmin is 0.5 and lmax is 1; 1 must be between them"),
+        ("scale='0'", "scale of the muscle is 0; it must be positive"),
+        ("vmax='0'", "vmax of the muscle is 0; it must be positive"),
+        ("fpmax='0'", "fpmax of the muscle is 0; it must be positive"),
+        ("fvmax='0'", "fvmax of the muscle is 0; it must be positive"),
+        ("tausmooth='-1'", "tausmooth must not be negative"),
+        ("force='1 2'", "'force'"),
+        ("site='s'", "<muscle> has no attribute 'site'"),
+    ] {
+        check(&muscle(attributes), &[expected]);
+    }
+    let limited = |compiler: &str, joint: &str| {
+        format!(
+            "<mujoco><compiler><lengthrange {compiler}/></compiler><worldbody><body><joint name='j' {joint}/><geom size='1'/></body>\
+             </worldbody><actuator><muscle joint='j'/></actuator></mujoco>"
+        )
+    };
+    for (compiler, joint) in [("uselimit='true'", "range='0 1'"), ("mode='none'", "")] {
+        Model::from_xml_str(&limited(compiler, joint), "limited.xml").expect("a muscle");
+    }
+    let class = "<default><muscle lengthrange='0 1'/></default><actuator><muscle joint='j'/></actuator>";
+    check(&with_section(class), &["<muscle> has no attribute 'lengthrange'"]);
+    for (compiler, joint) in [("uselimit='true'", ""), ("", "range='0 1'")] {
+        check(&limited(compiler, joint), &["<muscle> attribute 'lengthrange'", "uselimit"]);
+    }
+}
+
 /// An unsupported default is refused where an element uses it, and only there.
 #[test]
 fn unsupported_defaults_are_refused_where_they_are_used() {
@@ -507,7 +595,7 @@ fn unsupported_defaults_are_refused_where_they_are_used() {
         "<dcmotor motorconst='1' resistance='2'/>",
         "<pid kp='5'/>",
         "<orientation kp='5'/>",
-        "<general gaintype='muscle' biastype='muscle' dyntype='muscle'/>",
+        "<general gaintype='user' biastype='user' dyntype='user'/>",
         "<general input='ff'/>",
         "<tendon springyield='1'/>",
         "<pair adhesion='1'/>",
@@ -517,11 +605,12 @@ fn unsupported_defaults_are_refused_where_they_are_used() {
         let message = Model::from_xml_str(&with(unused, "", motor), "motor.xml").map_err(|e| e.to_string());
         assert!(message.is_ok() || unused.contains("delay"), "{unused}: {message:?}");
     }
-    check(&with("<muscle force='5'/>", "", general), &["<muscle>: only the actuators motor"]);
+    check(&with("<pid kp='5'/>", "", general), &["<pid>: only the actuators motor"]);
     check(
-        &with("<general gaintype='muscle'/>", "", general),
-        &["<general> attribute 'gaintype'", "constant and affine"],
+        &with("<general gaintype='user'/>", "", general),
+        &["<general> attribute 'gaintype'", "constant and affine laws and muscles"],
     );
+    check(&with("<muscle force='5'/>", "", general), &["<general> attribute 'lengthrange'"]);
     check(&with("<general input='pos vel'/>", "", general), &["'input'", "only one input"]);
     check(&with("<general delay='1'/>", "", motor), &["<general> attribute 'delay'", "'1' is not supported, only '0'"]);
     check(&with("<muscle delay='1'/>", "", motor), &["<muscle> attribute 'delay'"]);

@@ -42,6 +42,11 @@ fn load(text: &str) -> Result<(), TestCaseError> {
         let target = match actuator.transmission {
             Transmission::Joint(j) | Transmission::JointInParent(j) => j < model.joints.len(),
             Transmission::Tendon(t) => t < model.tendons.len(),
+            Transmission::Body(b) => b < model.bodies.len(),
+            Transmission::Site { site, reference } => site.max(reference.unwrap_or(0)) < model.sites.len(),
+            Transmission::SliderCrank { crank, slider, rod } => {
+                crank.max(slider) < model.sites.len() && finite(&[rod]) && rod > 0.0
+            }
         };
         prop_assert!(target && finite(&actuator.bias) && finite(&actuator.act_range));
         prop_assert!(actuator.act.is_none_or(|a| a < model.na));

@@ -5,24 +5,10 @@
 //! steps. From MuJoCo's states, the other lane types find the same accelerations up to their rounding.
 
 mod common;
+#[path = "common/motions.rs"]
+mod motions;
 
-use common::numbers::{distance, largest, numbers};
-use marathon_physics::lanes::Real;
-use marathon_physics::{Group, Isa, Model, Readings, Sim, SimOptions, Work, with_lanes};
-use serde_json::{Value, json};
-
-/// A case: the model without its outer element, initial velocities, controls and the number of steps.
-struct Case {
-    name: &'static str,
-    text: &'static str,
-    qvel: &'static [f64],
-    ctrl: &'static [f64],
-    steps: usize,
-}
-
-const fn case(name: &'static str, text: &'static str) -> Case {
-    Case { name, text, qvel: &[], ctrl: &[], steps: 300 }
-}
+use motions::{Case, case, compare};
 
 /// Two arms on a turntable, and posts to tie them to.
 macro_rules! arms {
@@ -218,96 +204,7 @@ const CASES: &[Case] = &[
     ),
 ];
 
-fn xml(case: &Case) -> String {
-    let name = case.name;
-    // sections come in any order
-    format!(r#"<mujoco model="{name}">{}</mujoco>"#, case.text)
-}
-
-/// Errors of the states, the sensors and the accelerations of a motion.
-fn follow(model: &Model, case: &Case, answer: &Value) -> [f64; 3] {
-    let sim = Sim::<f64>::new(model, SimOptions::default()).unwrap_or_else(|e| panic!("{}: {e}", case.name));
-    let (mut work, mut group, mut look) = (Work::new(&sim), Group::new(&sim), Work::new(&sim));
-    let start = if case.qvel.is_empty() { vec![0.0; model.nv] } else { case.qvel.to_vec() };
-    group.reset_lane(&sim, 0, &model.qpos0, &start);
-    group.ctrl.copy_from_slice(case.ctrl);
-    let mut worst = [0.0f64; 3];
-    for at in 0..case.steps / 10 {
-        sim.step(&mut work, &mut group, 10);
-        let apart = |ours: &[f64], theirs: &Value| {
-            largest(ours.iter().zip(numbers(theirs)).map(|(a, b)| (a - b).abs() / (1.0 + b.abs())))
-        };
-        worst[0] = worst[0].max(apart(&group.qpos, &answer["qpos"][at]));
-        worst[0] = worst[0].max(apart(&group.qvel, &answer["qvel"][at]));
-        sim.forward(&mut look, &group);
-        let readings = Readings::new(&sim, &group, &look);
-        let sensors = (0..model.sensors.len()).flat_map(|k| readings.sensor(k).expect("it is evaluated"));
-        worst[1] = worst[1].max(apart(&sensors.collect::<Vec<_>>(), &answer["sensordata"][at]));
-        let acc: Vec<f64> = (0..model.nv).map(|d| readings.qacc(d)).collect();
-        worst[2] = worst[2].max(apart(&acc, &answer["qacc"][at]));
-    }
-    worst
-}
-
-/// Accelerations in given states, lane by lane.
-fn accelerations<T: Real>(model: &Model, ctrl: &[f64], states: &[(Vec<f64>, Vec<f64>)]) -> Vec<Vec<f64>> {
-    let sim = Sim::<T>::new(model, SimOptions::default()).expect("as in double precision");
-    let mut work = Work::new(&sim);
-    let mut out = Vec::new();
-    for chunk in states.chunks(T::LANES) {
-        let mut group = Group::new(&sim);
-        for (lane, (qpos, qvel)) in chunk.iter().enumerate() {
-            group.reset_lane(&sim, lane, qpos, qvel);
-        }
-        for (u, x) in group.ctrl.iter_mut().zip(ctrl) {
-            *u = T::lit(*x);
-        }
-        sim.forward(&mut work, &group);
-        let readings = Readings::new(&sim, &group, &work);
-        for lane in 0..chunk.len() {
-            out.push((0..model.nv).map(|d| T::widen(readings.qacc(d).get(lane))).collect());
-        }
-    }
-    out
-}
-
 #[test]
 fn strings_move_as_in_mujoco() {
-    let jobs: Vec<Value> =
-        CASES.iter().map(|c| json!({ "text": xml(c), "qvel": c.qvel, "ctrl": c.ctrl, "steps": c.steps })).collect();
-    let answers = common::oracle("trajectories.py", &json!(jobs));
-    let mut failures = Vec::new();
-    for (case, answer) in CASES.iter().zip(answers.as_array().expect("an answer per model")) {
-        let model = Model::from_xml_str(&xml(case), "case.xml").unwrap_or_else(|e| panic!("{}: {e}", case.name));
-        let worst = follow(&model, case, answer);
-        let states: Vec<_> =
-            (0..case.steps / 10).map(|at| (numbers(&answer["qpos"][at]), numbers(&answer["qvel"][at]))).collect();
-        let exact = accelerations::<f64>(&model, case.ctrl, &states);
-        // from MuJoCo's states, errors do not add up
-        let mut at_once = 0.0f64;
-        for (a, b) in exact.iter().zip(answer["qacc"].as_array().expect("accelerations")).filter(|_| model.na == 0) {
-            at_once = at_once.max(distance(a, &numbers(b), 1.0));
-        }
-        let mut rounding = 0.0f64;
-        for isa in Isa::ALL.into_iter().filter(|i| i.supported() && *i != Isa::F64) {
-            let rounded = with_lanes!(isa, T => accelerations::<T>(&model, case.ctrl, &states));
-            for (state, company) in states.iter().zip(&rounded) {
-                let alone = with_lanes!(isa, T => accelerations::<T>(&model, case.ctrl, std::slice::from_ref(state)));
-                assert_eq!(alone[0], *company, "{}: other lanes change a lane's bits", case.name);
-            }
-            for (a, b) in rounded.iter().zip(&exact) {
-                let size = b.iter().fold(1.0f64, |m, x| m.max(x.abs()));
-                rounding = rounding.max(largest(a.iter().zip(b).map(|(x, y)| (x - y).abs() / size)));
-            }
-        }
-        let line = format!(
-            "{}: states {:.1e}, sensors {:.1e}, accelerations {:.1e} and {at_once:.1e}, single precision {rounding:.1e}",
-            case.name, worst[0], worst[1], worst[2]
-        );
-        println!("{line}");
-        if !(worst[0] < 1e-6 && worst[1] < 1e-6 && worst[2] < 1e-4 && at_once < 1e-8 && rounding < 1e-3) {
-            failures.push(line);
-        }
-    }
-    assert!(failures.is_empty(), "{}", failures.join("\n"));
+    compare(CASES);
 }

@@ -3,6 +3,7 @@
 //! Points above a level plane have their own list and rows ([`floor`]). [`narrow_phase`] finds all other pairs of
 //! geoms.
 
+mod adhesion;
 mod broad;
 mod candidate;
 mod convex;
@@ -10,5 +11,6 @@ mod floor;
 mod narrow_phase;
 mod slots;
 
+pub(crate) use adhesion::adhere;
 pub(crate) use floor::collide_floor;
 pub(crate) use narrow_phase::collide_pairs;

@@ -42,7 +42,11 @@ fn force_and_slope<T: Real>(
         None => u,
         Some(a) => {
             let act = group.act[a.index];
-            let rate = a.rate.map_or(u, |r| (u - act) * T::splat(r));
+            let rate = match (&a.rate, &a.muscle) {
+                (Some(r), _) => (u - act) * T::splat(*r),
+                (None, Some(muscle)) => muscle.rate(u, act),
+                (None, None) => u,
+            };
             forces.act_dot[a.index] = rate;
             if a.early { a.next(act, rate) } else { act }
         }
@@ -59,12 +63,23 @@ fn force_and_slope<T: Real>(
                 let gear = T::splat(*gear);
                 (gear * forces.tendon_length[*index], gear * forces.tendon_velocity[*index])
             }
+            TransmissionSpec::Drive(drive) => (forces.drives.length[*drive], forces.drives.velocity[*drive]),
+            // nothing is fed back, but the bias may be constant
+            TransmissionSpec::Adhesion => (T::zero(), T::zero()),
         };
         let (g, b) = (&actuator.gain, &actuator.bias);
         let gain = T::splat(g[2]).mul_add(velocity, T::splat(g[1]).mul_add(length, T::splat(g[0])));
         let bias = T::splat(b[2]).mul_add(velocity, T::splat(b[1]).mul_add(length, T::splat(b[0])));
         force = input.mul_add(gain, bias);
         slope = T::splat(g[2]).mul_add(input, T::splat(b[2]));
+        if let Some(muscle) = &actuator.gain_muscle {
+            let (gain, gain_slope) = muscle.gain(length, velocity);
+            force = input.mul_add(gain, force);
+            slope = gain_slope.mul_add(input, slope);
+        }
+        if let Some(muscle) = &actuator.bias_muscle {
+            force += muscle.bias(length);
+        }
     }
     (force, slope)
 }
@@ -113,6 +128,9 @@ fn share_tendons<T: Real>(sim: &Sim<T>, group: &Group<T>, forces: &mut Forces<T>
 #[inline(always)]
 pub(crate) fn actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
     let forces = &mut work.forces;
+    if !sim.drives.is_empty() {
+        forces.drives.copy_from(&work.drives);
+    }
     share_tendons(sim, group, forces);
     let limited = !sim.joint_force_ranges.is_empty();
     if limited {
@@ -154,6 +172,14 @@ pub(crate) fn actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
                     *sum = (gear * gear).neg_mul_add(slope, *sum);
                 }
             }
+            TransmissionSpec::Drive(drive) => {
+                for (dof, arm) in forces.drives.arms(sim, *drive) {
+                    qfrc[dof] = force.mul_add(arm, qfrc[dof]);
+                }
+                forces.minus_drive_deriv[*drive] = -slope;
+            }
+            // the contacts are not known yet
+            TransmissionSpec::Adhesion => {}
         }
     }
     if limited {

@@ -29,7 +29,7 @@ kernel_fn! {
 
 /// A point of a link, relative to its tree's reference point; in the world for a static point.
 #[inline(always)]
-fn arm<T: Real>(motion: &Motion<T>, spot: &Spot<T::Scalar>) -> V3<T> {
+pub(super) fn arm<T: Real>(motion: &Motion<T>, spot: &Spot<T::Scalar>) -> V3<T> {
     match spot.mount.link {
         Some(link) => motion.arm(&spot.mount, link),
         None => splat3(&spot.mount.pos),
@@ -38,7 +38,7 @@ fn arm<T: Real>(motion: &Motion<T>, spot: &Spot<T::Scalar>) -> V3<T> {
 
 /// Vector from one point to another, with their arms.
 #[inline(always)]
-fn between<T: Real>(motion: &Motion<T>, spots: [&Spot<T::Scalar>; 2], arms: &[V3<T>; 2]) -> V3<T> {
+pub(super) fn between<T: Real>(motion: &Motion<T>, spots: [&Spot<T::Scalar>; 2], arms: &[V3<T>; 2]) -> V3<T> {
     let mut places = *arms;
     // within a tree, adding the common reference would only lose digits
     if spots[0].tree != spots[1].tree {

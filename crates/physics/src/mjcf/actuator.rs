@@ -1,4 +1,4 @@
-//! `<actuator>`: motors and servos on joints and tendons.
+//! `<actuator>`: motors, servos and muscles on joints, tendons and sites.
 
 use super::actuator_params::{ActuatorParams, Limits};
 use super::defaults::Defaults;
@@ -6,12 +6,16 @@ use super::document::Element;
 use super::error::MjcfError;
 use super::limit::{check_limit, is_limited};
 use super::mass_matrix::MassMatrix;
-use super::math::{MIN_VAL, rotate};
+use super::math::MIN_VAL;
+use super::muscle;
 use super::names::Registry;
+use super::pose::Pose;
+use super::room::Room;
 use super::settings::{Settings, entries};
 use super::tendon::Moments;
+use super::transmission;
 use super::value::{Attrs, Tristate, polynomial};
-use crate::model::{Actuator, Dynamics, JointType, Model, Transmission};
+use crate::model::{Actuator, Dynamics, JointType, Model, Muscle, Transmission};
 
 /// All elements of `<actuator>` sections.
 pub(crate) fn elements(root: &Element) -> impl Iterator<Item = &Element> {
@@ -38,8 +42,10 @@ fn read(attrs: &Attrs, ends: &[usize]) -> Result<Actuator, MjcfError> {
         ctrl_range,
         force_limited: is_limited(attrs, "forcelimited", force_range)?,
         force_range,
-        gain: params.gain,
-        bias: params.bias,
+        gain: params.gain(),
+        bias: params.bias(),
+        gain_muscle: None,
+        bias_muscle: None,
         dynamics: params.dynamics(),
         act: None,
         act_limited: applies(act_limited, act_range),
@@ -60,6 +66,7 @@ pub(crate) fn compile(
     names: &Registry,
     settings: &Settings,
     model: &mut Model,
+    room: &Room,
 ) -> Result<(), MjcfError> {
     for element in elements(root) {
         let (attrs, ends) = defaults.actuator(element)?;
@@ -69,6 +76,7 @@ pub(crate) fn compile(
             model.na += 1;
         }
         reflect(&attrs, &actuator, model)?;
+        transmission::take_room(&attrs, model, &actuator, room)?;
         model.actuators.push(actuator);
     }
     model.nu = model.actuators.len();
@@ -84,12 +92,18 @@ fn actuator(
 ) -> Result<Actuator, MjcfError> {
     let element = attrs.element;
     let mut actuator = read(attrs, ends)?;
-    actuator.transmission = target(element, names)?;
+    actuator.transmission = transmission::target(attrs, names)?;
     check_limit(attrs, "forcelimited", "forcerange", actuator.force_range, settings)?;
     inherit_range(attrs, ends, &mut actuator, model)?;
     let Limits { ctrl_limited, act_limited, .. } = Limits::read(attrs)?;
     check_range(attrs, ("ctrllimited", ctrl_limited), ("ctrlrange", actuator.ctrl_range), settings)?;
     check_range(attrs, ("actlimited", act_limited), ("actrange", actuator.act_range), settings)?;
+    let muscles = ActuatorParams::compile(attrs, ends)?.muscles();
+    if muscles.iter().any(Option::is_some) {
+        let range = settings.lengthrange.of(attrs, actuator.transmission, model)?;
+        let of = |numbers: Option<_>| numbers.map(|n| muscle::muscle(element, &n, range)).transpose();
+        (actuator.gain_muscle, actuator.bias_muscle) = (of(muscles[0])?, of(muscles[1])?);
+    }
     let stateful = actuator.dynamics != Dynamics::None;
     if actuator.act_limited && !stateful {
         return Err(element.invalid("there is a range of activations, but no activation: dyntype is none"));
@@ -119,19 +133,6 @@ fn check_range(
         return Err(attrs.element.invalid(format!("'{name}' goes from {low} to {high}; the first must be smaller")));
     }
     Ok(())
-}
-
-/// Target that the actuator drives.
-fn target(element: &Element, names: &Registry) -> Result<Transmission, MjcfError> {
-    let given: Vec<&str> =
-        ["joint", "jointinparent", "tendon"].into_iter().filter(|name| element.attr(name).is_some()).collect();
-    match given.as_slice() {
-        [] => Err(element.invalid("the attribute 'joint' is missing")),
-        ["joint"] => names.joints.required(element, "joint").map(Transmission::Joint),
-        ["jointinparent"] => names.joints.required(element, "jointinparent").map(Transmission::JointInParent),
-        ["tendon"] => names.tendons.required(element, "tendon").map(Transmission::Tendon),
-        several => Err(element.invalid(format!("there are both '{}'", several.join("' and '")))),
-    }
 }
 
 /// Takes the range of the joint or tendon over, if `inheritrange` says so: for the control of a position servo, or for
@@ -193,41 +194,40 @@ fn reflect(attrs: &Attrs, actuator: &Actuator, model: &mut Model) -> Result<(), 
             let tendon = &mut model.tendons[t];
             add((&mut tendon.armature, &mut tendon.damping, &mut tendon.damping_poly));
         }
+        Transmission::Site { .. } | Transmission::SliderCrank { .. } | Transmission::Body(_) => {
+            let given = [("damping", damping != 0.0 || damping_poly != [0.0; 2]), ("armature", armature != 0.0)];
+            if let Some((name, _)) = given.iter().find(|(_, given)| *given) {
+                return Err(attrs.element.invalid(format!("'{name}' needs a joint or a tendon")));
+            }
+        }
     }
     Ok(())
 }
 
-/// Turns damping ratios of position servos into damping.
+/// Turns damping ratios of position servos into damping, and scales of muscles into forces.
 ///
 /// Critical damping is `2 sqrt(kp m)`, where `1/m` is the inverse mass seen through the gear. Source: MuJoCo,
-/// `dampratio`.
-pub(crate) fn resolve_damping(model: &mut Model, mass: &MassMatrix, tendons: &Moments) {
+/// `dampratio`. A muscle without a force has its scale over the acceleration that a unit of its force causes.
+pub(crate) fn resolve(model: &mut Model, pose: &Pose, mass: &MassMatrix, tendons: &Moments) {
     for i in 0..model.actuators.len() {
+        let actuator = &model.actuators[i];
+        let scaled = |m: &Option<Muscle>| m.is_some_and(|m| m.force < 0.0);
+        if scaled(&actuator.gain_muscle) || scaled(&actuator.bias_muscle) {
+            let acceleration = mass.inverse_norm(&transmission::moments(model, pose, actuator, tendons)).max(MIN_VAL);
+            let actuator = &mut model.actuators[i];
+            for muscle in [&mut actuator.gain_muscle, &mut actuator.bias_muscle].into_iter().flatten() {
+                if muscle.force < 0.0 {
+                    muscle.force = -muscle.force / acceleration;
+                }
+            }
+        }
         let actuator = &model.actuators[i];
         let (kp, ratio) = (actuator.gain[0], actuator.bias[2]);
         if kp != -actuator.bias[1] || ratio <= 0.0 {
             continue;
         }
-        let inverse = mass.inverse_form(&moments(model, actuator, tendons));
+        let inverse = mass.inverse_form(&transmission::moments(model, pose, actuator, tendons));
         let inertia = if inverse > MIN_VAL { 1.0 / inverse } else { 0.0 };
         model.actuators[i].bias[2] = -2.0 * ratio * (kp * inertia).max(0.0).sqrt();
-    }
-}
-
-/// The actuator's moment arms in the reference configuration, as `(dof, arm)`.
-fn moments(model: &Model, actuator: &Actuator, tendons: &Moments) -> Vec<(usize, f64)> {
-    let gear = actuator.gear;
-    match actuator.transmission {
-        Transmission::Tendon(t) => tendons[t].iter().map(|(dof, arm)| (*dof, arm * gear[0])).collect(),
-        Transmission::Joint(j) | Transmission::JointInParent(j) => {
-            let joint = &model.joints[j];
-            let mut arms = gear[..joint.kind.dofs()].to_vec();
-            // a ball joint is at its identity; the orientation of a free joint turns the torque into its own axes
-            if joint.kind == JointType::Free && matches!(actuator.transmission, Transmission::JointInParent(_)) {
-                let [w, x, y, z] = model.bodies[joint.body].quat;
-                arms[3..].copy_from_slice(&rotate([w, -x, -y, -z], [gear[3], gear[4], gear[5]]));
-            }
-            arms.into_iter().enumerate().map(|(k, arm)| (joint.dof_adr + k, arm)).collect()
-        }
     }
 }

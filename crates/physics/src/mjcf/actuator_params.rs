@@ -2,19 +2,38 @@
 
 use super::document::{Attr, Element};
 use super::error::MjcfError;
+use super::muscle;
 use super::schema::NO_ACTUATOR;
 use super::value::{Attrs, Tristate};
 use crate::hint::{did_you_mean, nearest};
 use crate::model::Dynamics;
 use std::f64::consts::PI;
 
-/// Kind of activation dynamics; the time constant is kept apart, as in MuJoCo.
+/// Kind of activation dynamics; their numbers are kept apart, as in MuJoCo.
 #[derive(Clone, Copy, PartialEq)]
 enum Activation {
     None,
     Integrator,
     Filter,
     FilterExact,
+    Muscle,
+}
+
+/// Kind of a gain or a bias.
+#[derive(Clone, Copy, PartialEq)]
+enum Law {
+    /// A constant gain, and no bias.
+    Plain,
+    Affine,
+    Muscle,
+}
+
+/// The numbers of a gain or a bias; most laws use only the first.
+type Numbers = [f64; 10];
+
+/// Three numbers, and none of the others.
+fn three([a, b, c]: [f64; 3]) -> Numbers {
+    [a, b, c, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
 }
 
 /// Gain, bias and activation as the elements of a class and the actuator itself set them, one after the other.
@@ -22,12 +41,13 @@ enum Activation {
 pub(crate) struct ActuatorParams<'a> {
     /// Element that set the parameters last.
     element: &'a str,
-    pub gain: [f64; 3],
-    gain_affine: bool,
-    pub bias: [f64; 3],
-    bias_affine: bool,
+    gain: Numbers,
+    gain_law: Law,
+    bias: Numbers,
+    bias_law: Law,
     activation: Activation,
-    time_constant: f64,
+    /// Time constant of a filter; those of a muscle, and the width of the transition between them.
+    times: [f64; 3],
     /// Part of the range of the joint or tendon that a position servo takes over; 0: none.
     pub inherited_range: f64,
     /// Unsupported settings, by the part of the parameters that may still replace them.
@@ -44,21 +64,31 @@ struct Refused<'a> {
 
 /// Parts that can be unsupported: the element, then the attributes of `<general>`, the kind of gain first.
 const PARTS: usize = 1 + ATTRIBUTES.len();
-const ATTRIBUTES: [&str; 6] = ["gaintype", "biastype", "dyntype", "gainprm", "biasprm", "input"];
+const ATTRIBUTES: [&str; 4] = ["gaintype", "biastype", "dyntype", "input"];
 /// The reason for refusing other kinds of gain and bias.
-const LAWS: &str = "only constant and affine laws are supported";
+const LAWS: &str = "only constant and affine laws and muscles are supported";
 
 impl<'a> ActuatorParams<'a> {
     const GENERAL: ActuatorParams<'static> = ActuatorParams {
         element: "general",
-        gain: [1.0, 0.0, 0.0],
-        gain_affine: false,
-        bias: [0.0; 3],
-        bias_affine: false,
+        gain: [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        gain_law: Law::Plain,
+        bias: [0.0; 10],
+        bias_law: Law::Plain,
         activation: Activation::None,
-        time_constant: 1.0,
+        times: [1.0, 0.0, 0.0],
         inherited_range: 0.0,
         refused: [None; PARTS],
+    };
+    const MUSCLE: ActuatorParams<'static> = ActuatorParams {
+        element: "muscle",
+        gain: muscle::NUMBERS,
+        gain_law: Law::Muscle,
+        bias: muscle::NUMBERS,
+        bias_law: Law::Muscle,
+        activation: Activation::Muscle,
+        times: muscle::TIMES,
+        ..ActuatorParams::GENERAL
     };
 
     /// The parameters of an actuator: the classes' elements in order, then its own.
@@ -77,35 +107,56 @@ impl<'a> ActuatorParams<'a> {
         if let Some(refused) = params.refused.iter().flatten().next() {
             return Err(refused.element.unsupported(refused.attribute, refused.reason));
         }
-        // the coefficients of an affine gain or bias have no effect without its type, so they are not stored
-        if !params.gain_affine {
-            params.gain = [params.gain[0], 0.0, 0.0];
-        }
-        if !params.bias_affine {
-            params.bias = [0.0; 3];
-        }
         Ok(params)
+    }
+
+    /// Coefficients of an affine gain, or a constant one. Other numbers have no effect, so they are left out.
+    pub fn gain(&self) -> [f64; 3] {
+        let [constant, length, velocity, ..] = self.gain;
+        match self.gain_law {
+            Law::Plain => [constant, 0.0, 0.0],
+            Law::Affine => [constant, length, velocity],
+            Law::Muscle => [0.0; 3],
+        }
+    }
+
+    /// Coefficients of an affine bias.
+    pub fn bias(&self) -> [f64; 3] {
+        let [constant, length, velocity, ..] = self.bias;
+        if self.bias_law == Law::Affine { [constant, length, velocity] } else { [0.0; 3] }
+    }
+
+    /// Numbers of a muscle's active and passive force.
+    pub fn muscles(&self) -> [Option<Numbers>; 2] {
+        let of = |law: Law, numbers: Numbers| (law == Law::Muscle).then_some(numbers);
+        [of(self.gain_law, self.gain), of(self.bias_law, self.bias)]
     }
 
     /// How the activation follows the control.
     pub fn dynamics(&self) -> Dynamics {
-        let time_constant = self.time_constant;
+        let [time_constant, deactivation, smoothing] = self.times;
         match self.activation {
             Activation::None => Dynamics::None,
             Activation::Integrator => Dynamics::Integrator,
             Activation::Filter => Dynamics::Filter { time_constant },
             Activation::FilterExact => Dynamics::FilterExact { time_constant },
+            Activation::Muscle => Dynamics::Muscle { activation: time_constant, deactivation, smoothing },
         }
     }
 
     /// Whether this is a servo that drives the length to its input, which may inherit a range.
     pub fn is_position_servo(&self) -> bool {
-        !self.gain_affine && self.bias_affine && self.gain[0] == -self.bias[1]
+        self.gain_law == Law::Plain && self.bias_law == Law::Affine && self.gain[0] == -self.bias[1]
     }
 
     /// Whether a shortcut element can start from these parameters.
     fn serves(&self, shortcut: &str) -> bool {
-        self.element == shortcut || (self.element == "general" && !self.gain_affine && self.refused[1].is_none())
+        let law = match shortcut {
+            "muscle" => Law::Muscle,
+            "damper" => Law::Affine,
+            _ => Law::Plain,
+        };
+        self.element == shortcut || (self.element == "general" && self.gain_law == law && self.refused[1].is_none())
     }
 
     /// Replaces an unsupported attribute.
@@ -125,17 +176,17 @@ impl<'a> ActuatorParams<'a> {
             return self.inherit(element, &attrs);
         }
         if !self.serves(name) {
-            *self =
-                enclosing.iter().rev().find(|params| params.serves(name)).copied().unwrap_or(ActuatorParams::GENERAL);
+            let own = if name == "muscle" { ActuatorParams::MUSCLE } else { ActuatorParams::GENERAL };
+            *self = enclosing.iter().rev().find(|params| params.serves(name)).copied().unwrap_or(own);
         }
         // of the activation of a general actuator a shortcut keeps only what it could have set itself
-        let known = name == "cylinder" || (name == "position" && self.activation == Activation::FilterExact);
+        let known =
+            matches!(name, "cylinder" | "muscle") || (name == "position" && self.activation == Activation::FilterExact);
         if self.element != name && !known {
-            (self.activation, self.time_constant) = (Activation::None, ActuatorParams::GENERAL.time_constant);
+            (self.activation, self.times) = (Activation::None, ActuatorParams::GENERAL.times);
         }
-        // the shortcut sets all parts itself, but keeps unknown parts of an unsupported element; adhesion has a
-        // constant gain
-        let unknown = self.refused[0].filter(|_| self.element == "general").filter(|of| of.element.name != "adhesion");
+        // the shortcut sets all parts itself, but keeps unknown parts of an unsupported element
+        let unknown = self.refused[0].filter(|_| self.element == "general");
         self.refused = [None; PARTS];
         self.refused[0] = unknown;
         let kept = self.gain[0];
@@ -143,43 +194,57 @@ impl<'a> ActuatorParams<'a> {
             "position" | "intvelocity" => self.servo(element, &attrs)?,
             "velocity" => {
                 let kv = attrs.number_or("kv", kept)?;
-                (self.gain, self.bias) = ([kv, 0.0, 0.0], [0.0, 0.0, -kv]);
+                (self.gain, self.bias) = (three([kv, 0.0, 0.0]), three([0.0, 0.0, -kv]));
                 self.activation = Activation::None;
             }
             "damper" => {
-                let kept = if self.gain_affine { -self.gain[2] } else { 0.0 };
+                let kept = if self.gain_law == Law::Affine { -self.gain[2] } else { 0.0 };
                 let kv = attrs.number_or("kv", kept)?;
                 if kv < 0.0 {
                     return Err(element.invalid("kv must not be negative"));
                 }
-                (self.gain, self.bias) = ([0.0, 0.0, -kv], [0.0; 3]);
+                (self.gain, self.bias) = (three([0.0, 0.0, -kv]), [0.0; 10]);
                 self.activation = Activation::None;
             }
             "cylinder" => {
                 let area = attrs.number_or("area", kept)?;
                 let area =
                     attrs.array::<1>("diameter")?.map_or(area, |[d]| if d >= 0.0 { PI / 4.0 * d * d } else { area });
-                (self.gain, self.bias) = ([area, 0.0, 0.0], attrs.array_or("bias", self.bias)?);
-                self.time_constant = attrs.number_or("timeconst", self.time_constant)?;
+                let [a, b, c, ..] = self.bias;
+                (self.gain, self.bias) = (three([area, 0.0, 0.0]), three(attrs.array_or("bias", [a, b, c])?));
+                self.times = [attrs.number_or("timeconst", self.times[0])?, 0.0, 0.0];
                 self.activation = Activation::Filter;
             }
             "motor" => *self = ActuatorParams::GENERAL,
+            "adhesion" => {
+                let gain = attrs.number_or("gain", kept)?;
+                if gain < 0.0 {
+                    return Err(element.invalid("gain must not be negative"));
+                }
+                (self.gain, self.bias) = (three([gain, 0.0, 0.0]), [0.0; 10]);
+            }
+            "muscle" => {
+                muscle::read(&attrs, &mut self.gain, &mut self.times)?;
+                self.bias = self.gain;
+                self.activation = Activation::Muscle;
+            }
             // the class's settings, which the element may replace
             _ => {
                 *self = ActuatorParams::GENERAL;
                 let refused = Some(Refused { element, attribute: None, reason: NO_ACTUATOR });
                 self.refused[0] = refused;
-                if name == "adhesion" {
-                    self.gain[0] = attrs.number_or("gain", kept)?;
-                } else {
-                    self.refused[1] = refused;
-                }
+                self.refused[1] = refused;
                 self.element = name;
                 return Ok(());
             }
         }
-        (self.element, self.gain_affine, self.bias_affine) =
-            (name, name == "damper", !matches!(name, "motor" | "damper"));
+        self.element = name;
+        (self.gain_law, self.bias_law) = match name {
+            "motor" | "adhesion" => (Law::Plain, Law::Plain),
+            "damper" => (Law::Affine, Law::Plain),
+            "muscle" => (Law::Muscle, Law::Muscle),
+            _ => (Law::Plain, Law::Affine),
+        };
         Ok(())
     }
 
@@ -197,12 +262,12 @@ impl<'a> ActuatorParams<'a> {
             (None, Some([ratio])) => ratio,
             (None, None) => self.bias[2],
         };
-        (self.gain, self.bias) = ([kp, 0.0, 0.0], [0.0, -kp, damping]);
+        (self.gain, self.bias) = (three([kp, 0.0, 0.0]), three([0.0, -kp, damping]));
         if let Some([time]) = attrs.array("timeconst")? {
             if time < 0.0 {
                 return Err(element.invalid("timeconst must not be negative"));
             }
-            self.time_constant = time;
+            self.times = [time, 0.0, 0.0];
             self.activation = if time == 0.0 { Activation::None } else { Activation::FilterExact };
         }
         if element.name == "intvelocity" {
@@ -232,36 +297,25 @@ impl<'a> ActuatorParams<'a> {
     /// `<general>` changes what it gives and keeps the rest.
     fn general(&mut self, element: &'a Element, attrs: &Attrs) -> Result<(), MjcfError> {
         self.element = "general";
-        let mut more = Vec::new();
-        for (name, values) in [("gainprm", &mut self.gain), ("biasprm", &mut self.bias)] {
-            let mut all = [0.0; 10];
-            all[..3].copy_from_slice(values);
-            attrs.overlay(name, 0, &mut all)?;
-            values.copy_from_slice(&all[..3]);
-            if all[3..].iter().any(|x| *x != 0.0) {
-                more.push(name);
-            }
-        }
-        for name in more {
-            self.set_part(name, element, Some("only the first three numbers are supported"));
-        }
+        attrs.overlay("gainprm", 0, &mut self.gain)?;
+        attrs.overlay("biasprm", 0, &mut self.bias)?;
         let mut dynamics = [0.0; 10];
-        dynamics[0] = self.time_constant;
+        dynamics[..3].copy_from_slice(&self.times);
         attrs.overlay("dynprm", 0, &mut dynamics)?;
-        self.time_constant = dynamics[0];
+        self.times.copy_from_slice(&dynamics[..3]);
         let gains = [
-            ("fixed", Some(false)),
-            ("affine", Some(true)),
-            ("muscle", None),
+            ("fixed", Some(Law::Plain)),
+            ("affine", Some(Law::Affine)),
+            ("muscle", Some(Law::Muscle)),
             ("dcmotor", None),
             ("so3", None),
             ("pid", None),
             ("user", None),
         ];
         let biases = [
-            ("none", Some(false)),
-            ("affine", Some(true)),
-            ("muscle", None),
+            ("none", Some(Law::Plain)),
+            ("affine", Some(Law::Affine)),
+            ("muscle", Some(Law::Muscle)),
             ("dcmotor", None),
             ("so3", None),
             ("user", None),
@@ -271,22 +325,22 @@ impl<'a> ActuatorParams<'a> {
             ("integrator", Some(Activation::Integrator)),
             ("filter", Some(Activation::Filter)),
             ("filterexact", Some(Activation::FilterExact)),
-            ("muscle", None),
+            ("muscle", Some(Activation::Muscle)),
             ("dcmotor", None),
             ("pid", None),
             ("user", None),
         ];
         if let Some(kind) = attrs.keyword("gaintype", &gains)? {
-            self.gain_affine = kind.unwrap_or(false);
+            self.gain_law = kind.unwrap_or(Law::Plain);
             self.set_part("gaintype", element, kind.is_none().then_some(LAWS));
         }
         if let Some(kind) = attrs.keyword("biastype", &biases)? {
-            self.bias_affine = kind.unwrap_or(false);
+            self.bias_law = kind.unwrap_or(Law::Plain);
             self.set_part("biastype", element, kind.is_none().then_some(LAWS));
         }
         if let Some(kind) = attrs.keyword("dyntype", &activations)? {
             self.activation = kind.unwrap_or(Activation::None);
-            let reason = "only none, integrator, filter and filterexact are supported";
+            let reason = "only none, integrator, filter, filterexact and muscle are supported";
             self.set_part("dyntype", element, kind.is_none().then_some(reason));
         }
         if let Some(attr) = element.attr("input") {
@@ -356,8 +410,10 @@ impl Limits {
         match element.name.as_str() {
             "position" if inherits => self.ctrl_range = [0.0; 2],
             "intvelocity" if inherits => self.act_range = [0.0; 2],
-            "damper" if self.ctrl_range.iter().any(|x| *x < 0.0) => {
-                return Err(element.invalid("the control range of a damper must not be negative"));
+            "damper" | "adhesion" if self.ctrl_range.iter().any(|x| *x < 0.0) => {
+                let owner = if element.name == "damper" { "a damper" } else { "adhesion" };
+                let message = format!("the control range of {owner} must not be negative");
+                return Err(element.invalid(message));
             }
             "damper" | "adhesion" => self.ctrl_limited = Tristate::True,
             _ => {}

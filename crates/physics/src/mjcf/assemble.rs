@@ -78,7 +78,7 @@ pub(crate) fn compile(root: &Element, file: &ReadFile, room: &Room) -> Result<Mo
     model.pairs = contact::pairs(root, &defaults, &names, &model.geoms)?;
     model.excludes = contact::excludes(root, &names)?;
     mesh::add(&mut model, &assets.meshes, room)?;
-    actuator::compile(root, &defaults, &names, &settings, &mut model)?;
+    actuator::compile(root, &defaults, &names, &settings, &mut model, room)?;
     model.sensors = sensor::compile(root, &names, &model, room)?;
     model.keyframes = custom::keyframes(root, &model, room)?;
 
@@ -91,7 +91,7 @@ pub(crate) fn compile(root: &Element, file: &ReadFile, room: &Room) -> Result<Mo
         .map_err(|e| bodies[e.body()].element.invalid(e.to_string()))?;
     statistics::compute(&mut model, &pose, &mass_matrix.diagonal, &given);
     mass_matrix::tendon_inverse_weights(&mut model, &mass_matrix, &moments);
-    actuator::resolve_damping(&mut model, &mass_matrix, &moments);
+    actuator::resolve(&mut model, &pose, &mass_matrix, &moments);
     spring_dampers(&mut model, &bodies);
     check_finite(&model, &bodies)?;
     Ok(model)
@@ -120,8 +120,16 @@ fn check_finite(model: &Model, bodies: &[BodySpec]) -> Result<(), MjcfError> {
     if !finite(&[stat.mean_inertia, stat.mean_mass, stat.extent]) || !finite(&stat.center) {
         return Err(root.invalid("the extent of the model is too large to compute with"));
     }
-    if !model.actuators.iter().all(|a| finite(&a.bias) && finite(&a.ctrl_range) && finite(&a.act_range)) {
-        return Err(root.invalid("the damping or range of an actuator is too large to compute with"));
+    let strong = |m: &Option<Muscle>| m.is_none_or(|m| finite(&[m.force]));
+    let sound = |a: &Actuator| {
+        finite(&a.bias)
+            && finite(&a.ctrl_range)
+            && finite(&a.act_range)
+            && strong(&a.gain_muscle)
+            && strong(&a.bias_muscle)
+    };
+    if !model.actuators.iter().all(sound) {
+        return Err(root.invalid("the damping, force or range of an actuator is too large to compute with"));
     }
     let sound = |t: &Tendon| {
         finite(&t.spring_length) && finite(&[t.length0, t.invweight0, t.armature, t.damping]) && finite(&t.damping_poly)

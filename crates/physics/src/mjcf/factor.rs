@@ -50,6 +50,34 @@ impl Factor {
             }
         }
     }
+
+    /// `inv(M) v`.
+    pub fn solve(&self, mut v: Vec<f64>) -> Vec<f64> {
+        match self {
+            Factor::Dense { n, lower } => solve_upper(lower, *n, solve_lower(lower, *n, v)),
+            Factor::Branches(rows) => {
+                for (k, row) in rows.iter().enumerate().rev() {
+                    let x = v[k];
+                    row.entries.iter().for_each(|(i, l)| v[*i] -= l * x);
+                }
+                for (k, row) in rows.iter().enumerate() {
+                    let sum: f64 = row.entries.iter().map(|(i, l)| l * v[*i]).sum();
+                    v[k] = v[k] / row.diagonal - sum;
+                }
+                v
+            }
+        }
+    }
+}
+
+/// Solves `L' x = rhs`.
+fn solve_upper(factor: &[f64], n: usize, mut x: Vec<f64>) -> Vec<f64> {
+    for i in (0..n).rev() {
+        x[i] /= factor[i * n + i];
+        let (head, own) = x.split_at_mut(i);
+        head.iter_mut().zip(&factor[i * n..]).for_each(|(x, l)| *x -= l * own[0]);
+    }
+    x
 }
 
 /// Eliminates each dof from its ancestors, from the leaves to the root, as in MuJoCo's `mj_factorM`.
@@ -139,8 +167,13 @@ mod tests {
         let branches = Factor::Branches(branches(&matrix, &parents).expect("positive"));
         for k in 0..n {
             let v: Vec<f64> = (0..n).map(|i| ((i * k) % 5) as f64 - 1.5).collect();
-            let (a, b) = (dense.inverse_form(v.clone()), branches.inverse_form(v));
+            let (a, b) = (dense.inverse_form(v.clone()), branches.inverse_form(v.clone()));
             assert!((a - b).abs() < 1e-9 * a.abs(), "{a} and {b}");
+            for factor in [&dense, &branches] {
+                let x = factor.solve(v.clone());
+                let back = (0..n).map(|i| (0..n).map(|j| entry(i, j) * x[j]).sum::<f64>());
+                assert!(back.zip(&v).all(|(a, b)| (a - b).abs() < 1e-9), "{x:?}");
+            }
         }
     }
 }

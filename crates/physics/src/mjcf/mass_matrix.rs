@@ -56,6 +56,19 @@ pub(crate) struct MassMatrix {
 impl MassMatrix {
     /// `v inv(M) v'` for a vector that is zero except for some dofs, given as `(dof, value)`.
     pub fn inverse_form(&self, values: &[(usize, f64)]) -> f64 {
+        // from 0: a sum over nothing is -0
+        self.by_block(values).into_iter().fold(0.0, |sum, (block, rhs)| sum + self.blocks[block].2.inverse_form(rhs))
+    }
+
+    /// Length of `inv(M) v`, for such a vector.
+    pub fn inverse_norm(&self, values: &[(usize, f64)]) -> f64 {
+        let blocks = self.by_block(values).into_iter();
+        let squares = blocks.flat_map(|(block, rhs)| self.blocks[block].2.solve(rhs)).map(|x| x * x);
+        squares.sum::<f64>().sqrt()
+    }
+
+    /// The parts of such a vector that are not zero, by block.
+    fn by_block(&self, values: &[(usize, f64)]) -> BTreeMap<usize, Vec<f64>> {
         let of_dof = |dof: usize| self.blocks.partition_point(|(start, ..)| *start <= dof) - 1;
         let mut touched: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
         for (dof, value) in values {
@@ -63,8 +76,7 @@ impl MassMatrix {
             let (start, n, _) = &self.blocks[block];
             touched.entry(block).or_insert_with(|| vec![0.0; *n])[dof - start] += value;
         }
-        // from 0: a sum over nothing is -0
-        touched.into_iter().fold(0.0, |sum, (block, rhs)| sum + self.blocks[block].2.inverse_form(rhs))
+        touched
     }
 }
 

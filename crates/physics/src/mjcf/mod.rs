@@ -8,7 +8,7 @@
 //!
 //! The way of a file: `document` parses the XML and expands includes, `schema` refuses what is misspelled or not
 //! supported, `defaults` lays classes under elements, `tree` reads the bodies, `inertia` gives them mass,
-//! `asset` (with `mesh`), `tendon` (with `tendon_path`), `equality`, `actuator`, `sensor` and `custom` read the rest, `assemble` puts the [`Model`] together,
+//! `asset` (with `mesh`), `tendon` (with `tendon_path`), `equality`, `actuator` (with `transmission` and `muscle`), `sensor` and `custom` read the rest, `assemble` puts the [`Model`] together,
 //! `mass_matrix` (with `pose` and `factor`) and `statistics` compute what follows from the reference configuration. `room` counts the memory
 //! that all of them ask for. [`spec`] edits the document before it is compiled.
 //!
@@ -33,6 +33,7 @@ mod limit;
 mod mass_matrix;
 mod math;
 mod mesh;
+mod muscle;
 mod names;
 mod orientation;
 mod pose;
@@ -45,6 +46,7 @@ pub mod spec;
 mod statistics;
 mod tendon;
 mod tendon_path;
+mod transmission;
 mod tree;
 mod value;
 

@@ -75,8 +75,8 @@ const TOP: &[Rule] = &[
         ),
         &[rule(
             "lengthrange",
-            "",
-            "accel interval inttotal maxforce mode timeconst timestep tolrange useexisting uselimit",
+            "mode useexisting uselimit",
+            "accel interval inttotal maxforce timeconst timestep tolrange",
             "",
         )],
     ),
@@ -281,34 +281,41 @@ const EQUALITY: &[Rule] = &[
 /// Attributes of every actuator that have an effect only with something that is refused.
 macro_rules! actuator_ignores {
     () => {
-        "cranklength group interp lengthrange user"
+        "group interp user"
     };
 }
-/// Attributes of every actuator that are refused: other transmissions, and delay.
+/// Attributes of every actuator that are refused: delay.
 macro_rules! actuator_refuses {
     () => {
-        "delay=0 nsample=0 site refsite slidersite cranksite"
+        "delay=0 nsample=0"
     };
 }
-/// Attributes of every actuator that are read.
+/// Attributes of every actuator that are read, but for those of sites.
+macro_rules! muscle_reads {
+    () => {
+        "name class joint jointinparent tendon cranksite slidersite cranklength gear ctrllimited ctrlrange forcelimited \
+         forcerange lengthrange damping armature"
+    };
+}
+/// Attributes of every actuator but the muscle that are read.
 macro_rules! actuator_reads {
     () => {
-        "name class joint jointinparent tendon gear ctrllimited ctrlrange forcelimited forcerange damping armature"
+        concat!(muscle_reads!(), " site refsite")
     };
 }
 /// The reason for refusing other actuators.
-pub(crate) const NO_ACTUATOR: &str =
-    "only the actuators motor, position, velocity, intvelocity, damper, cylinder and general are supported";
+pub(crate) const NO_ACTUATOR: &str = "only the actuators motor, position, velocity, intvelocity, damper, cylinder, muscle, adhesion and general \
+     are supported";
 const ACTUATOR: &[Rule] = &[
     rule(
         "general",
         concat!(
             actuator_reads!(),
-            " gainprm gaintype biasprm biastype dynprm dyntype actdim actearly actlimited actrange inheritrange input"
+            " gainprm gaintype biasprm biastype dynprm dyntype actdim actearly actlimited actrange inheritrange input body"
         ),
         // only unsupported laws use the inputs that these two ranges limit
         concat!(actuator_ignores!(), " ffrange velrange"),
-        concat!(actuator_refuses!(), " body"),
+        actuator_refuses!(),
     ),
     rule("motor", actuator_reads!(), actuator_ignores!(), actuator_refuses!()),
     rule(
@@ -334,8 +341,18 @@ const ACTUATOR: &[Rule] = &[
     ),
     refused("orientation", NO_ACTUATOR),
     refused("pid", NO_ACTUATOR),
-    refused("muscle", NO_ACTUATOR),
-    refused("adhesion", NO_ACTUATOR),
+    rule(
+        "muscle",
+        concat!(muscle_reads!(), " timeconst tausmooth range force scale lmin lmax vmax fpmax fvmax"),
+        actuator_ignores!(),
+        actuator_refuses!(),
+    ),
+    rule(
+        "adhesion",
+        "name class body gain ctrlrange forcelimited forcerange",
+        "group interp user",
+        actuator_refuses!(),
+    ),
     refused("dcmotor", NO_ACTUATOR),
     NO_PLUGIN,
 ];
@@ -460,8 +477,7 @@ fn descend(parent: &Element, rules: &'static [Rule]) -> Result<(), MjcfError> {
 }
 
 /// Attributes that belong to one element and not to a class.
-const NOT_IN_CLASSES: &str =
-    "name class target joint jointinparent tendon geom1 geom2 site refsite slidersite cranksite body";
+const NOT_IN_CLASSES: &str = "name class target joint jointinparent tendon geom1 geom2 site refsite slidersite cranksite body lengthrange tausmooth";
 
 /// Elements that set defaults, apart from actuators and elements with their own rules.
 const DEFAULTS: [&str; 8] = ["joint", "geom", "site", "camera", "light", "pair", "material", "texture"];

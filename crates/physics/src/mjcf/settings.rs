@@ -2,6 +2,7 @@
 
 use super::document::Element;
 use super::error::MjcfError;
+use super::muscle::LengthRange;
 use super::solver_params::{SOLIMP, SOLREF};
 use super::value::{Attrs, Tristate};
 use crate::model::{Cone, ContactOverride, Flags, Integrator, Options, Solver, Vec3};
@@ -35,6 +36,8 @@ pub(crate) struct Settings {
     pub strippath: bool,
     /// Primitives are fitted to the bounding box of a mesh instead of its inertia.
     pub fitaabb: bool,
+    /// Where the ranges of the lengths of muscles are from.
+    pub lengthrange: LengthRange,
 }
 
 impl Settings {
@@ -68,6 +71,7 @@ impl Settings {
             medium: false,
             strippath: false,
             fitaabb: false,
+            lengthrange: LengthRange::DEFAULT,
         };
         for element in sections(root, "compiler") {
             settings.section(element)?;
@@ -101,6 +105,9 @@ impl Settings {
         }
         self.strippath = attrs.flag_or("strippath", self.strippath)?;
         self.fitaabb = attrs.flag_or("fitaabb", self.fitaabb)?;
+        for range in element.children.iter().filter(|e| e.name == "lengthrange") {
+            self.lengthrange.apply(range)?;
+        }
         if let Some(attr) = element.attr("eulerseq") {
             let turn = |c: char| {
                 let axis = "xyz".find(c.to_ascii_lowercase())?;

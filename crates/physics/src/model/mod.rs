@@ -15,7 +15,7 @@ mod shape;
 pub(crate) mod vector;
 mod view;
 
-pub use actuator::{Actuator, Dynamics, Transmission};
+pub use actuator::{Actuator, Dynamics, Muscle, Transmission};
 pub use coupling::{Equality, EqualityKind, PathPart, PathSpan, Tendon, TendonKind};
 pub use hull::Hull;
 pub use sensor::{Sensor, SensorObject, SensorType};

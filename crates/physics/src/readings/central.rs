@@ -5,8 +5,9 @@
 
 use super::Readings;
 use super::forces::{ContactForce, Wrench};
-use super::joint_space::{constraint_wrenches, joint_space};
+use super::joint_space::constraint_wrenches;
 use crate::algebra::spatial::*;
+use crate::dynamics::joint_space;
 use crate::lanes::{Kernel, Real};
 use crate::rows::Source;
 use crate::sim::{Mount, Sim, TransmissionSpec};
@@ -265,6 +266,19 @@ impl<T: Real> Kernel<T> for Actuation<'_, T> {
                         work.readings.qfrc_actuator[dof] = pull.mul_add(arm, work.readings.qfrc_actuator[dof]);
                     }
                 }
+                // below
+                TransmissionSpec::Adhesion => {}
+                TransmissionSpec::Drive(drive) => {
+                    for (dof, arm) in work.forces.drives.arms(sim, *drive) {
+                        work.readings.qfrc_actuator[dof] = force.mul_add(arm, work.readings.qfrc_actuator[dof]);
+                    }
+                }
+            }
+        }
+        for (i, spec) in sim.adhesions.iter().enumerate() {
+            let force = work.forces.actuator_force[spec.actuator];
+            for (sum, arm) in work.readings.qfrc_actuator.iter_mut().zip(work.adhesion.of(sim, i)) {
+                *sum = force.mul_add(*arm, *sum);
             }
         }
         for (dof, low, high) in &sim.joint_force_ranges {
@@ -284,7 +298,7 @@ impl<T: Real> Kernel<T> for JointForces<'_, T> {
         let mut links = std::mem::take(&mut work.readings.link_force);
         let mut joints = std::mem::take(&mut work.readings.qfrc_constraint);
         constraint_wrenches(work, &mut links, &mut joints);
-        joint_space(sim, work, &mut links, &mut joints);
+        joint_space(sim, &work.dofs, &mut links, &mut joints);
         (work.readings.link_force, work.readings.qfrc_constraint) = (links, joints);
     }
 }

@@ -4,8 +4,8 @@
 
 use super::Readings;
 use crate::algebra::spatial::*;
+use crate::dynamics::joint_space;
 use crate::lanes::Real;
-use crate::sim::Sim;
 use crate::state::Work;
 
 impl<T: Real> Readings<'_, T> {
@@ -30,7 +30,7 @@ impl<T: Real> Readings<'_, T> {
         let mut links = vec![[T::zero(); 6]; self.sim.links.len()];
         let mut joints = vec![T::zero(); self.sim.model.nv];
         constraint_wrenches(self.work, &mut links, &mut joints);
-        joint_space(self.sim, self.work, &mut links, &mut joints);
+        joint_space(self.sim, &self.work.dofs, &mut links, &mut joints);
         joints
     }
 
@@ -60,7 +60,7 @@ impl<T: Real> Readings<'_, T> {
     /// Converts forces on links to forces on joints.
     fn joint_space(&self, mut forces: Vec<V6<T>>) -> Vec<T> {
         let mut out = vec![T::zero(); self.sim.model.nv];
-        joint_space(self.sim, self.work, &mut forces, &mut out);
+        joint_space(self.sim, &self.work.dofs, &mut forces, &mut out);
         out
     }
 
@@ -99,23 +99,6 @@ pub(crate) fn constraint_wrenches<T: Real>(work: &Work<T>, links: &mut [V6<T>], 
     }
     for f in &work.rows.dry {
         joints[f.dof] += f.force;
-    }
-}
-
-/// Adds the effect of forces on links to the joints. Every joint carries everything above it. Accumulates the forces on
-/// the way.
-#[inline(always)]
-pub(crate) fn joint_space<T: Real>(sim: &Sim<T>, work: &Work<T>, links: &mut [V6<T>], joints: &mut [T]) {
-    for (l, link) in sim.links.iter().enumerate().rev() {
-        let f = links[l];
-        for d in link.dofs.clone() {
-            joints[d] += dot6(&work.dofs[d].axis, &f);
-        }
-        if let Some(p) = link.parent {
-            for i in 0..6 {
-                links[p][i] += f[i];
-            }
-        }
     }
 }
 

@@ -55,6 +55,12 @@ impl<T: Real> Readings<'_, T> {
             Transmission::Tendon(t) => return [self.tendon_length(t) * gear[0], self.tendon_velocity(t) * gear[0]],
             Transmission::Joint(j) => (&m.joints[j], false),
             Transmission::JointInParent(j) => (&m.joints[j], true),
+            // the velocity of contacts is not evaluated
+            Transmission::Body(_) => return [T::zero(); 2],
+            Transmission::Site { .. } | Transmission::SliderCrank { .. } => {
+                let drive = self.sim.drives.iter().position(|d| d.actuator == actuator).unwrap_or_default();
+                return [self.work.drives.length[drive], self.work.drives.velocity[drive]];
+            }
         };
         let (q, d) = (joint.qpos_adr, joint.dof_adr);
         let rate = |d: usize| [self.group.qvel[d], self.group.qvel[d + 1], self.group.qvel[d + 2]];
@@ -80,7 +86,7 @@ impl<T: Real> Readings<'_, T> {
         }
     }
 
-    /// Total force of all actuators on a hinge or slide, including those that pull its tendons. `None` if gravity
+    /// Total force of all actuators on a hinge or slide, including those that act through tendons and sites. `None` if gravity
     /// compensation counts as one of them.
     #[inline(always)]
     pub(super) fn joint_actuator_force(&self, joint: usize) -> Option<T> {
@@ -108,10 +114,21 @@ impl<T: Real> Readings<'_, T> {
                     TendonKind::Fixed(terms) => terms.iter().find(|(j, _)| *j == joint).map_or(0.0, |(_, c)| *c),
                     TendonKind::Spatial(_) => 0.0,
                 },
+                // below
+                Transmission::Site { .. } | Transmission::SliderCrank { .. } | Transmission::Body(_) => 0.0,
             };
             if lever != 0.0 {
                 sum = T::lit(lever * a.gear[0]).mul_add(self.work.forces.actuator_force[i], sum);
             }
+        }
+        for (i, drive) in self.sim.drives.iter().enumerate() {
+            for (_, arm) in self.work.forces.drives.arms(self.sim, i).filter(|(dof, _)| *dof == one.dof_adr) {
+                sum = arm.mul_add(self.work.forces.actuator_force[drive.actuator], sum);
+            }
+        }
+        for (i, spec) in self.sim.adhesions.iter().enumerate() {
+            let arm = self.work.adhesion.of(self.sim, i)[one.dof_adr];
+            sum = arm.mul_add(self.work.forces.actuator_force[spec.actuator], sum);
         }
         if let Some([low, high]) = one.actuator_force_range {
             sum = sum.max(T::lit(low)).min(T::lit(high));

@@ -5,7 +5,7 @@ use super::joints::LimitReading;
 use super::rays::inside_shape;
 use crate::algebra::spatial::*;
 use crate::lanes::{Kernel, Real};
-use crate::model::{Sensor, SensorObject, SensorType};
+use crate::model::{Sensor, SensorObject, SensorType, Transmission};
 use crate::sim::Mount;
 
 impl<T: Real> Readings<'_, T> {
@@ -17,6 +17,7 @@ impl<T: Real> Readings<'_, T> {
     /// * [`SensorType::InsideSite`] that measures how far a shape is enclosed;
     /// * [`SensorType::Force`] and [`SensorType::Torque`] on a site of the world;
     /// * [`SensorType::RangeFinder`] in a model with a visible mesh;
+    /// * [`SensorType::ActuatorVel`] of an actuator on contacts;
     /// * [`SensorType::JointActuatorFrc`] of a joint whose gravity compensation counts as an actuator;
     /// * frames of cameras that turn by themselves.
     pub fn sensor(&self, sensor: usize) -> Option<Vec<T>> {
@@ -51,6 +52,11 @@ impl<T: Real> Readings<'_, T> {
             }
             // as in MuJoCo, the velocity is then not computed
             (S::ActuatorVel, _) if !self.sim.model.opt.flags.actuation => vec![T::zero()],
+            (S::ActuatorVel, O::Actuator(a))
+                if matches!(self.sim.model.actuators[a].transmission, Transmission::Body(_)) =>
+            {
+                return None;
+            }
             (S::ActuatorPos | S::ActuatorVel, O::Actuator(a)) => {
                 vec![self.transmission(a)[usize::from(s.kind == S::ActuatorVel)]]
             }

@@ -1,5 +1,6 @@
 //! Actuators.
 
+use super::muscle::{MuscleActivation, MuscleSpec};
 use crate::lanes::Real;
 use crate::model::{Actuator, Dynamics, Model, Transmission};
 
@@ -10,6 +11,10 @@ pub(crate) enum TransmissionSpec<C> {
     Joint { dofs: std::ops::Range<usize>, qpos: usize, gear: [C; 6] },
     /// A tendon, and the gear.
     Tendon { index: usize, gear: C },
+    /// A drive, which has its own gears.
+    Drive(usize),
+    /// Contacts, which are found later.
+    Adhesion,
 }
 
 /// An actuator.
@@ -20,6 +25,9 @@ pub(crate) struct ActuatorSpec<C> {
     pub force: Option<(C, C)>,
     pub gain: [C; 3],
     pub bias: [C; 3],
+    /// In place of gain and bias. Few actuators are muscles, so they do not lengthen the list.
+    pub gain_muscle: Option<Box<MuscleSpec<C>>>,
+    pub bias_muscle: Option<Box<MuscleSpec<C>>>,
     /// Whether it is a plain motor: force = gain * input.
     pub plain: bool,
     pub activation: Option<Activation<C>>,
@@ -32,6 +40,7 @@ pub(crate) struct Activation<C> {
     pub index: usize,
     /// Rate of change per unit of distance from the control. `None` integrates the control.
     pub rate: Option<C>,
+    pub muscle: Option<Box<MuscleActivation<C>>>,
     /// Time that multiplies the rate of change over a step, s.
     pub reach: C,
     pub range: Option<(C, C)>,
@@ -44,7 +53,8 @@ pub(super) fn actuators<T: Real>(model: &Model) -> Vec<ActuatorSpec<T::Scalar>> 
     let c = T::scalar;
     let flags = &model.opt.flags;
     let range = |on: bool, r: &[f64; 2]| on.then(|| (c(r[0]), c(r[1])));
-    let spec = |a: &Actuator| {
+    let mut drives = 0..;
+    let mut spec = |a: &Actuator| {
         let transmission = match a.transmission {
             Transmission::Joint(j) | Transmission::JointInParent(j) => {
                 let joint = &model.joints[j];
@@ -52,10 +62,15 @@ pub(super) fn actuators<T: Real>(model: &Model) -> Vec<ActuatorSpec<T::Scalar>> 
                 TransmissionSpec::Joint { dofs, qpos: joint.qpos_adr, gear: a.gear.map(c) }
             }
             Transmission::Tendon(index) => TransmissionSpec::Tendon { index, gear: c(a.gear[0]) },
+            // the drives are in the order of their actuators
+            Transmission::Site { .. } | Transmission::SliderCrank { .. } => {
+                TransmissionSpec::Drive(drives.next().unwrap_or_default())
+            }
+            Transmission::Body(_) => TransmissionSpec::Adhesion,
         };
         let (dt, tiny) = (model.opt.timestep, 1e-15);
         let rate = match a.dynamics {
-            Dynamics::None | Dynamics::Integrator => None,
+            Dynamics::None | Dynamics::Integrator | Dynamics::Muscle { .. } => None,
             Dynamics::Filter { time_constant } | Dynamics::FilterExact { time_constant } => {
                 Some(c(1.0 / f64::max(time_constant, tiny)))
             }
@@ -73,17 +88,25 @@ pub(super) fn actuators<T: Real>(model: &Model) -> Vec<ActuatorSpec<T::Scalar>> 
             force: range(a.force_limited, &a.force_range),
             gain: a.gain.map(c),
             bias: a.bias.map(c),
-            plain: a.gain[1..] == [0.0; 2] && a.bias == [0.0; 3],
+            gain_muscle: a.gain_muscle.as_ref().map(|m| Box::new(MuscleSpec::new::<T>(m))),
+            bias_muscle: a.bias_muscle.as_ref().map(|m| Box::new(MuscleSpec::new::<T>(m))),
+            plain: !a.is_fed_back() && a.bias == [0.0; 3],
             activation: a.act.map(|index| Activation {
                 index,
                 rate,
+                muscle: match a.dynamics {
+                    Dynamics::Muscle { activation, deactivation, smoothing } => {
+                        Some(Box::new(MuscleActivation::new::<T>(activation, deactivation, smoothing)))
+                    }
+                    _ => None,
+                },
                 reach: c(reach),
                 range: range(a.act_limited, &a.act_range),
                 early: a.act_early,
             }),
         }
     };
-    if flags.actuation { model.actuators.iter().map(spec).collect() } else { Vec::new() }
+    if flags.actuation { model.actuators.iter().map(&mut spec).collect() } else { Vec::new() }
 }
 
 /// Bounds of the total actuator force on a degree of freedom.

@@ -6,15 +6,18 @@
 //! Each file prepares one kind of constant. The kernels that read it are in the folders above.
 
 mod actuator;
+mod adhesion;
 mod broad;
 mod caps;
 mod contact_params;
 mod contacts;
+mod drive;
 mod equality;
 mod floor_points;
 mod limit;
 mod link;
 mod medium;
+mod muscle;
 mod no_slip;
 mod options;
 mod pairs;
@@ -27,13 +30,16 @@ mod weights;
 mod weld;
 
 pub(crate) use actuator::{Activation, ActuatorSpec, TendonForceRange, TransmissionSpec};
+pub(crate) use adhesion::AdhesionSpec;
 pub(crate) use broad::Broad;
 pub(crate) use caps::Caps;
 pub(crate) use contacts::Contacts;
+pub(crate) use drive::{DriveKind, DriveSpec};
 pub(crate) use equality::{EqualitySpec, Frames, Length, Tie};
 pub(crate) use limit::{BallLimit, DryFriction, LimitSpec};
 pub(crate) use link::{Link, LinkJoint, Mount};
 pub(crate) use medium::{Drag, GravComp};
+pub(crate) use muscle::{MuscleActivation, MuscleSpec};
 pub(crate) use no_slip::NoSlip;
 pub(crate) use options::MOST_COUPLED_ROWS;
 pub use options::{SimError, SimOptions};
@@ -77,7 +83,10 @@ pub struct Sim<T: Real> {
     pub(crate) tendons: Vec<TendonSpec<T::Scalar>>,
     /// The paths of spatial tendons.
     pub(crate) strings: Vec<StringSpec<T::Scalar>>,
-    /// The matrix of `implicitfast`, if tendons have a share in it.
+    pub(crate) adhesions: Vec<AdhesionSpec>,
+    /// Transmissions through sites.
+    pub(crate) drives: Vec<DriveSpec<T::Scalar>>,
+    /// The matrix of `implicitfast`, if tendons or drives have a share in it.
     pub(crate) damped_tendons: Option<TreeMatrix>,
     pub(crate) ball_limits: Vec<BallLimit<T::Scalar>>,
     pub(crate) gravcomp: Vec<GravComp<T::Scalar>>,
@@ -136,7 +145,8 @@ impl<T: Real> Sim<T> {
         let tree_of: Vec<usize> = links.iter().map(|l| l.tree).collect();
         let geoms: Vec<_> = model.geoms.iter().enumerate().map(|(i, g)| mount(g.body, model.geom_frame(i))).collect();
         let sites: Vec<_> = model.sites.iter().enumerate().map(|(i, s)| mount(s.body, model.site_frame(i))).collect();
-        let strings = string::strings::<T>(model, &string::Mounts { sites: &sites, geoms: &geoms, trees: &tree_of });
+        let places = string::Mounts { sites: &sites, geoms: &geoms, trees: &tree_of };
+        let (strings, drives) = (string::strings::<T>(model, &places), drive::drives::<T>(model, &places));
         let contacts = contacts::contacts::<T>(model, &mounts, &link_of, &tree_of, &options)?;
         let damped = flags.damper && model.dofs.iter().any(|d| d.damping != 0.0);
         let implicit_fast = model.opt.integrator == Integrator::ImplicitFast;
@@ -161,6 +171,8 @@ impl<T: Real> Sim<T> {
             equalities,
             tendons,
             strings,
+            adhesions: adhesion::adhesions(model),
+            drives,
             damped_tendons: TreeMatrix::of_damped_tendons(model),
             gravcomp: medium::gravity_compensation::<T>(model, &mounts, &link_of),
             drags: medium::drags::<T>(model, &mounts, &link_of),

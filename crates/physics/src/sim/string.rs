@@ -42,10 +42,17 @@ pub(crate) struct Spot<C> {
     pub tree: Option<usize>,
 }
 
+impl<C: Clone> Spot<C> {
+    /// A point at the origin of a mount.
+    pub(super) fn new(mount: &Mount<C>, trees: &[usize]) -> Self {
+        Spot { mount: mount.clone(), tree: mount.link.map(|l| trees[l]) }
+    }
+}
+
 /// A degree of freedom that moves one end of a straight piece and not the other.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lever {
-    /// Its place among the tendon's degrees of freedom.
+    /// Its place among the degrees of freedom of its tendon or drive.
     pub place: usize,
     pub dof: usize,
     /// The end: 0 or 1.
@@ -79,8 +86,8 @@ pub(super) fn dofs(model: &Model, kind: &TendonKind) -> Vec<usize> {
     dofs
 }
 
-/// The degrees of freedom that move one of two bodies and not the other, for a tendon with the degrees of freedom `dofs`.
-fn levers(model: &Model, dofs: &[usize], bodies: [usize; 2]) -> Vec<Lever> {
+/// The degrees of freedom that move one of two bodies and not the other, with their places in `dofs`.
+pub(super) fn levers(model: &Model, dofs: &[usize], bodies: [usize; 2]) -> Vec<Lever> {
     let between = model.dofs_between(bodies);
     let ends = between.iter().enumerate().flat_map(|(end, list)| list.iter().map(move |dof| (*dof, end)));
     ends.filter_map(|(dof, end)| dofs.binary_search(&dof).ok().map(|place| Lever { place, dof, end })).collect()
@@ -89,7 +96,7 @@ fn levers(model: &Model, dofs: &[usize], bodies: [usize; 2]) -> Vec<Lever> {
 /// Prepares the paths of the spatial tendons.
 pub(super) fn strings<T: Real>(model: &Model, mounts: &Mounts<T::Scalar>) -> Vec<StringSpec<T::Scalar>> {
     let c = T::scalar;
-    let spot = |mount: &Mount<T::Scalar>| Spot { mount: mount.clone(), tree: mount.link.map(|l| mounts.trees[l]) };
+    let spot = |mount: &Mount<T::Scalar>| Spot::new(mount, mounts.trees);
     let mut out = Vec::new();
     for (tendon, t) in model.tendons.iter().enumerate() {
         if !matches!(t.kind, TendonKind::Spatial(_)) {

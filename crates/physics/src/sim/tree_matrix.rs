@@ -1,6 +1,7 @@
 //! The layout of a symmetric matrix with entries only between degrees of freedom of which one carries the other, like
 //! the mass matrix.
 
+use super::drive;
 use crate::model::same_frame::small;
 use crate::model::{Integrator, JointType, Model, Transmission};
 use std::ops::Range;
@@ -17,10 +18,12 @@ pub(crate) struct TreeMatrix {
     pub dropped: Vec<Range<usize>>,
     /// Tendons whose forces depend on their velocities.
     pub tendons: Vec<usize>,
+    /// Drives whose forces do.
+    pub drives: Vec<usize>,
 }
 
 impl TreeMatrix {
-    /// The matrix that `implicitfast` solves with, for models in which tendons have a share in it.
+    /// The matrix that `implicitfast` solves with, for models in which tendons or drives have a share in it.
     pub fn of_damped_tendons(model: &Model) -> Option<TreeMatrix> {
         if model.opt.integrator != Integrator::ImplicitFast {
             return None;
@@ -29,10 +32,12 @@ impl TreeMatrix {
         let damped = |t: usize| flags.damper && model.tendons[t].damping != 0.0;
         let fed_back = |t: usize| {
             let mut pulls = model.actuators.iter().filter(|a| a.transmission == Transmission::Tendon(t));
-            flags.actuation && pulls.any(|a| a.gain[2] != 0.0 || a.bias[2] != 0.0)
+            flags.actuation && pulls.any(|a| a.damps())
         };
         let tendons: Vec<usize> = (0..model.tendons.len()).filter(|t| damped(*t) || fed_back(*t)).collect();
-        if tendons.is_empty() {
+        let driving = drive::actuators(model).enumerate();
+        let drives: Vec<usize> = driving.filter(|(_, (_, a))| flags.actuation && a.damps()).map(|(i, _)| i).collect();
+        if tendons.is_empty() && drives.is_empty() {
             return None;
         }
         let parent: Vec<Option<usize>> = model.dofs.iter().map(|d| d.parent).collect();
@@ -45,7 +50,7 @@ impl TreeMatrix {
         }
         let of_simple = |d: &usize| is_simple(model, model.dofs[*d].body);
         let dropped = (0..parent.len()).filter(of_simple).map(|d| start[d] + 1..start[d] + depth[d]).collect();
-        Some(TreeMatrix { start, parent, len, dropped, tendons })
+        Some(TreeMatrix { start, parent, len, dropped, tendons, drives })
     }
 }
 

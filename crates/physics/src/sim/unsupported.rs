@@ -11,7 +11,7 @@ pub(crate) fn check(model: &Model) -> Result<(), SimError> {
     let found = options(model)
         .or_else(|| model.bodies.iter().find_map(|b| body(model, b)))
         .or_else(|| model.tendons.iter().enumerate().find_map(tendon))
-        .or_else(|| model.actuators.iter().find_map(|a| actuator(model, a)));
+        .or_else(|| model.actuators.iter().enumerate().find_map(|(i, a)| actuator(model, i, a)));
     found.map_or(Ok(()), refuse)
 }
 
@@ -57,9 +57,13 @@ fn joint(model: &Model, body: &Body, siblings: &[Joint], i: usize, joint: &Joint
     None
 }
 
+/// A name in quotes; many tendons and actuators have none.
+fn label(name: &str, index: usize) -> String {
+    if name.is_empty() { format!("number {index}") } else { format!("'{name}'") }
+}
+
 fn tendon((index, tendon): (usize, &Tendon)) -> Refusal {
-    // many tendons have no name
-    let name = if tendon.name.is_empty() { format!("number {index}") } else { format!("'{}'", tendon.name) };
+    let name = label(&tendon.name, index);
     if tendon.stiffness_poly != [0.0; 2] || tendon.damping_poly != [0.0; 2] {
         return Some((format!("polynomial stiffness or damping of tendon {name}"), "use the linear term"));
     }
@@ -69,22 +73,41 @@ fn tendon((index, tendon): (usize, &Tendon)) -> Refusal {
     None
 }
 
-fn actuator(model: &Model, a: &Actuator) -> Refusal {
-    let name = &a.name;
-    let affine = a.gain[1..] != [0.0; 2] || a.bias[1..] != [0.0; 2];
+fn actuator(model: &Model, index: usize, a: &Actuator) -> Refusal {
+    let name = label(&a.name, index);
     match a.transmission {
-        Transmission::Tendon(_) => {}
+        Transmission::Tendon(_) | Transmission::Site { .. } | Transmission::SliderCrank { .. } => {}
+        Transmission::Body(b) => return adhesion(model, &name, a, b),
         Transmission::Joint(j) | Transmission::JointInParent(j) => {
             let joint = &model.joints[j];
             let scalar = matches!(joint.kind, JointType::Hinge | JointType::Slide);
             if !scalar && matches!(a.transmission, Transmission::JointInParent(_)) {
-                return Some((format!("jointinparent of actuator '{name}'"), "use joint"));
+                return Some((format!("jointinparent of actuator {name}"), "use joint"));
             }
-            if !scalar && affine {
-                let what = format!("actuator '{name}' with position or velocity feedback on joint '{}'", joint.name);
+            if !scalar && a.is_fed_back() {
+                let what = format!("actuator {name} with position or velocity feedback on joint '{}'", joint.name);
                 return Some((what, "only hinge and slide joints can be fed back"));
             }
         }
+    }
+    None
+}
+
+/// Contacts that an actuator pulls at.
+fn adhesion(model: &Model, name: &str, a: &Actuator, body: usize) -> Refusal {
+    let body = label(&model.bodies[body].name, body);
+    if a.is_fed_back() {
+        let what = format!("actuator {name} with position or velocity feedback on the contacts of body {body}");
+        return Some((what, "use a constant gain"));
+    }
+    // MuJoCo's adhesion also acts on contacts in the gap, which are not looked for
+    if model.geoms.iter().map(|g| g.gap).chain(model.pairs.iter().map(|p| p.gap)).any(|gap| gap != 0.0) {
+        return Some((format!("actuator {name} on the contacts of body {body}, with gaps"), "set gap to 0"));
+    }
+    if let Some(joint) = model.joints.iter().find(|j| j.actuator_force_range.is_some()) {
+        let what =
+            format!("actuator {name} on the contacts of body {body} with actuatorfrcrange of joint '{}'", joint.name);
+        return Some((what, "remove actuatorfrcrange"));
     }
     None
 }

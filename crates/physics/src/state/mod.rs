@@ -14,7 +14,7 @@ pub(crate) use clearance::clearance;
 pub(crate) use coupling::Coupling;
 pub use group::Group;
 pub use scratch::Work;
-pub(crate) use scratch::{Capped, DofWork, Forces, Motion, Solver, net_bias_force};
+pub(crate) use scratch::{Capped, DampedTendons, DofWork, Forces, Motion, Solver, net_bias_force};
 pub(crate) use scratch::{Law, MOST_ROWS, Patch, Place, Slip, SlipLane};
 pub use stats::SolverStats;
 pub(crate) use sweep::{Sweep, nowhere};

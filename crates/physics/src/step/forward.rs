@@ -1,7 +1,7 @@
 //! The acceleration of a state, stage by stage.
 
 use crate::algebra::planar::{Full, Planar};
-use crate::collision::{collide_floor, collide_pairs};
+use crate::collision::{adhere, collide_floor, collide_pairs};
 use crate::constraint::{equality_blocks, joint_rows, tendon_blocks};
 use crate::dynamics::*;
 use crate::lanes::{Real, kernel_fn};
@@ -149,6 +149,9 @@ impl<T: Real> Sim<T> {
         if !self.contacts.pairs.is_empty() {
             pair_rows(self, group, work);
         }
+        if !self.adhesions.is_empty() {
+            adhere(self, work);
+        }
     }
 
     fn fwd_constraint(&self, work: &mut Work<T>, group: &Group<T>) {
@@ -169,11 +172,18 @@ impl<T: Real> Sim<T> {
         if !self.strings.is_empty() {
             measure_strings(self, group, work);
         }
+        if !self.drives.is_empty() {
+            measure_drives(self, group, work);
+        }
     }
 
     /// Like [`Sim::refresh`], including the forces of the actuators.
     pub(crate) fn refresh_actuators(&self, work: &mut Work<T>, group: &Group<T>) {
         self.refresh(work, group);
         joint_forces(self, group, work);
+        if !self.adhesions.is_empty() {
+            work.continues = false;
+            self.make_constraint(work, group);
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! `integrator="implicitfast"` for models with tendons whose forces depend on their velocities.
+//! `integrator="implicitfast"` for models with tendons, or actuators at sites, whose forces depend on their velocities.
 //!
 //! Such a tendon adds `J' b J` to the matrix that the integrator solves with, where `b` is its damping with that of its
 //! actuators. As in MuJoCo, only entries of degrees of freedom of which one carries the other count. A tendon across
@@ -11,7 +11,7 @@
 use crate::algebra::spatial::*;
 use crate::lanes::{Real, kernel_fn};
 use crate::sim::{Sim, TreeMatrix};
-use crate::state::Work;
+use crate::state::{DampedTendons, Work};
 
 kernel_fn! {
     /// Solves for the acceleration with all damping at the end of the step, into `solution`.
@@ -63,7 +63,7 @@ fn mass_matrix<T: Real>(sim: &Sim<T>, work: &mut Work<T>, matrix: &TreeMatrix) {
     }
 }
 
-/// The negative derivative of the forces by the velocities: the diagonal, and the tendons' entries.
+/// The negative derivative of the forces by the velocities: the diagonal, and the entries of tendons and drives.
 #[inline(always)]
 fn damping_matrix<T: Real>(sim: &Sim<T>, work: &mut Work<T>, matrix: &TreeMatrix) {
     let Work { forces, damped_tendons: c, .. } = work;
@@ -72,22 +72,36 @@ fn damping_matrix<T: Real>(sim: &Sim<T>, work: &mut Work<T>, matrix: &TreeMatrix
         c.damping[*start] = *x;
     }
     for t in &matrix.tendons {
-        let (tendon, rate) = (&sim.tendons[*t], forces.minus_tendon_deriv[*t]);
-        c.arms.fill(T::zero());
-        for (dof, arm) in tendon.arms(&forces.tendon_moments) {
-            c.arms[dof] = arm;
-        }
-        for (d, arm) in tendon.arms(&forces.tendon_moments) {
-            let force = rate * arm;
-            let (mut at, mut next) = (matrix.start[d], Some(d));
-            while let Some(i) = next {
-                c.damping[at] = force.mul_add(c.arms[i], c.damping[at]);
-                (at, next) = (at + 1, matrix.parent[i]);
-            }
-        }
+        let tendon = &sim.tendons[*t];
+        add_product(matrix, c, forces.minus_tendon_deriv[*t], || tendon.arms(&forces.tendon_moments));
+    }
+    for d in &matrix.drives {
+        add_product(matrix, c, forces.minus_drive_deriv[*d], || forces.drives.arms(sim, *d));
     }
     for row in &matrix.dropped {
         c.damping[row.clone()].fill(T::zero());
+    }
+}
+
+/// Adds `J' b J` to the damping, for the moment arms `J`.
+#[inline(always)]
+fn add_product<T: Real, I: Iterator<Item = (usize, T)>>(
+    matrix: &TreeMatrix,
+    c: &mut DampedTendons<T>,
+    rate: T,
+    arms: impl Fn() -> I,
+) {
+    c.arms.fill(T::zero());
+    for (dof, arm) in arms() {
+        c.arms[dof] = arm;
+    }
+    for (d, arm) in arms() {
+        let force = rate * arm;
+        let (mut at, mut next) = (matrix.start[d], Some(d));
+        while let Some(i) = next {
+            c.damping[at] = force.mul_add(c.arms[i], c.damping[at]);
+            (at, next) = (at + 1, matrix.parent[i]);
+        }
     }
 }
 

@@ -42,7 +42,7 @@ part! {
 }
 
 part! {
-    /// An actuator on a joint or tendon.
+    /// An actuator on a joint, a tendon, a site or the contacts of a body.
     Actuator: Actuator in ModelPart {
         /// Its force is the control times `gear`.
         pub fn motor(name: &str) -> Self {
@@ -64,6 +64,12 @@ part! {
             Actuator(Draft::new("general").with("name", name))
         }
 
+        /// Pulls a body towards what it touches. The force, the control times `gain`, is spread over the contacts.
+        pub fn adhesion(name: &str, body: &str, gain: f64, ctrl_range: [f64; 2]) -> Self {
+            let draft = Draft::new("adhesion").with("name", name).with("body", body);
+            Actuator(draft.with("gain", gain).with("ctrlrange", ctrl_range))
+        }
+
         /// The joint that it moves.
         pub fn joint(self, joint: &str) -> Self {
             self.set("joint", joint)
@@ -72,6 +78,21 @@ part! {
         /// The tendon that it pulls.
         pub fn tendon(self, tendon: &str) -> Self {
             self.set("tendon", tendon)
+        }
+
+        /// The site that it pushes and turns, along the site's axes. `gear` has the force first, then the torque.
+        pub fn site(self, site: &str, gear: [f64; 6]) -> Self {
+            self.set("site", site).set("gear", gear)
+        }
+
+        /// The site whose axes the force and torque at its [`site`](Self::site) are along, and which takes their opposites.
+        pub fn reference_site(self, site: &str) -> Self {
+            self.set("refsite", site)
+        }
+
+        /// A rod of some length (m) from the site `crank` to a slider on the z axis of the site `slider`.
+        pub fn slider_crank(self, crank: &str, slider: &str, rod: f64) -> Self {
+            self.set("cranksite", crank).set("slidersite", slider).set("cranklength", rod)
         }
 
         /// Default class.

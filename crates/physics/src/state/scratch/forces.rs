@@ -1,5 +1,6 @@
 //! Forces on joints and links that do not come from constraints.
 
+use super::Drives;
 use crate::algebra::spatial::V6;
 use crate::lanes::Real;
 use crate::sim::Sim;
@@ -22,6 +23,10 @@ pub(crate) struct Forces<T: Real> {
     pub tendon_moments: Vec<T>,
     /// Negative derivative of each tendon's force with respect to its velocity, with `implicitfast`.
     pub minus_tendon_deriv: Vec<T>,
+    /// Measures of the drives at the last evaluation of the forces.
+    pub drives: Drives<T>,
+    /// The same derivative of each drive's force.
+    pub minus_drive_deriv: Vec<T>,
     /// Factors of the actuator forces on each tendon and of their derivatives: not 1 if the sum is out of bounds.
     pub tendon_share: Vec<[T; 2]>,
     /// External torque and force on every link: gravity compensation, fluid, and pushes (`xfrc_applied`). Empty for
@@ -44,6 +49,8 @@ impl<T: Real> Forces<T> {
             tendon_velocity: vec![z; sim.tendons.len()],
             tendon_moments: vec![z; sim.tendons.iter().map(|t| t.dofs.len()).sum()],
             minus_tendon_deriv: vec![z; sim.tendons.len()],
+            drives: Drives::new(sim),
+            minus_drive_deriv: vec![z; sim.drives.len()],
             tendon_share: vec![[T::lit(1.0); 2]; sim.tendons.len()],
             link_applied: Vec::with_capacity(nl),
             actuator_force: vec![z; sim.model.nu],

@@ -1,8 +1,10 @@
 //! Scratch memory of a step.
 
+mod adhesion;
 mod capped;
 mod contacts;
 mod dof;
+mod drives;
 mod forces;
 mod motion;
 mod readings;
@@ -11,9 +13,11 @@ mod slip;
 mod solver;
 mod strings;
 
+pub(crate) use adhesion::Adhesion;
 pub(crate) use capped::Capped;
 pub(crate) use contacts::GeomContacts;
 pub(crate) use dof::DofWork;
+pub(crate) use drives::Drives;
 pub(crate) use forces::Forces;
 pub(crate) use motion::Motion;
 pub(crate) use readings::Measured;
@@ -36,6 +40,8 @@ pub struct Work<T: Real> {
     pub(crate) dofs: Vec<DofWork<T>>,
     pub(crate) forces: Forces<T>,
     pub(crate) strings: Strings<T>,
+    pub(crate) drives: Drives<T>,
+    pub(crate) adhesion: Adhesion<T>,
     pub(crate) damped_tendons: DampedTendons<T>,
     pub(crate) solver: Solver<T>,
     pub(crate) contacts: GeomContacts<T>,
@@ -63,6 +69,8 @@ impl<T: Real> Work<T> {
             dofs: vec![DofWork::new(); sim.model.nv],
             forces: Forces::new(sim),
             strings: Strings::new(sim),
+            drives: Drives::new(sim),
+            adhesion: Adhesion::new(sim),
             damped_tendons: DampedTendons::new(sim),
             solver: Solver::new(sim),
             contacts: GeomContacts::new(sim),

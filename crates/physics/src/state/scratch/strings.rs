@@ -25,7 +25,7 @@ impl<T: Real> Strings<T> {
     }
 }
 
-/// Memory of `implicitfast` for models in which tendons have a share in its matrix. Empty for other models.
+/// Memory of `implicitfast` for models in which tendons or drives have a share in its matrix. Empty for other models.
 #[derive(Clone, Debug)]
 pub(crate) struct DampedTendons<T: Real> {
     /// Inertia of each link with everything that it carries.
