@@ -1,4 +1,4 @@
-//! What an actuator acts on: a joint, a tendon, sites, or the contacts of a body.
+//! The target of an actuator: a joint, a tendon, sites, or the contacts of a body.
 
 use super::error::MjcfError;
 use super::math::{Frame, axes, cross, dot, rotate, scale, sub};

@@ -22,7 +22,7 @@ pub(crate) struct DriveSpec<C> {
     pub levers: Vec<Lever>,
 }
 
-/// What a drive does at its ends.
+/// The loads of a drive at its ends.
 #[derive(Clone, Debug)]
 pub(crate) enum DriveKind<C> {
     /// Force and torque along the axes of the second end.

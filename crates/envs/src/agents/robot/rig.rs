@@ -77,7 +77,7 @@ pub struct Rig {
     changes: Changes,
 }
 
-/// What the rig has chosen for the model, for the list of findings.
+/// Choices of the rig for the list of findings.
 #[derive(Clone, Debug)]
 struct Changes {
     /// Where the standing pose comes from.
