@@ -1,10 +1,11 @@
 //! The plugin that makes up the game.
 
-use crate::app::cli::{self, Args};
+use crate::app::cli::Args;
 use crate::app::error::GameError;
 use crate::app::features::course::{Runs, check_table};
 use crate::app::features::replay::play::Playback;
 use crate::app::features::training::{self, TrainingOptions};
+use crate::app::first_scene;
 use crate::app::input::camera::{CameraSettings, ChosenCamera};
 use crate::app::input::scripted::{ScriptedActions, ScriptedInputs};
 use crate::app::mode::Mode;
@@ -47,7 +48,7 @@ impl GamePlugin {
     /// If an agent, a policy, a model or a recording cannot be used.
     pub fn new(args: &Args) -> Result<Self, GameError> {
         let shipped = ShippedPolicies::decode();
-        let mut scenario = cli::scenario(args, &shipped)?;
+        let mut scenario = first_scene::scenario(args, &shipped)?;
         let mut playback = None;
         if let Some(path) = &args.replay {
             let recording = Recording::load(path)?;

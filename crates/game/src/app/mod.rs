@@ -10,6 +10,7 @@ mod display;
 mod error;
 mod features;
 mod files;
+mod first_scene;
 mod game;
 mod input;
 mod interrupt;

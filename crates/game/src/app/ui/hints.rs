@@ -256,8 +256,9 @@ fn broken(widths: &[f32], room: f32) -> Vec<Range<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::cli::{self, Args};
+    use crate::app::cli::Args;
     use crate::app::features;
+    use crate::app::first_scene;
     use crate::app::mode::Mode;
     use crate::app::stage::policies::ShippedPolicies;
     use bevy_marathon::MoveDirection;
@@ -268,7 +269,7 @@ mod tests {
     #[allow(clippy::type_complexity, reason = "a line and a list")]
     fn hints(words: &[&str], pads: bool) -> Result<(Vec<(String, String)>, Vec<Row>), Box<dyn std::error::Error>> {
         let args = Args::parse_from([&["marathon-game"], words].concat());
-        let scenario = cli::scenario(&args, &ShippedPolicies::decode())?;
+        let scenario = first_scene::scenario(&args, &ShippedPolicies::decode())?;
         let ranges = TaskConfig::named(&scenario.agent)?.factory()?.spec().command.clone();
         let by_camera = MoveDirection::moves(&ranges) && scenario.mode != Mode::Course;
         let (bindings, key_hints) = (Bindings::default(), features::key_hints());
