@@ -37,7 +37,7 @@ fn models() -> Vec<PathBuf> {
     paths.extend(["hopper", "walker", "humanoid", "cheetah"].map(|n| suite.join(format!("{n}.xml"))));
     paths.extend(["hopper", "walker2d_v5", "half_cheetah", "ant", "humanoid"].map(|n| gym.join(format!("{n}.xml"))));
     // the position sets the seed: new models come last, so that the others keep their states
-    paths.sort_by_key(|path| path.ends_with("marathon_man.xml"));
+    paths.sort_by_key(|path| ["marathon_man.xml", "quadruped.xml"].iter().position(|name| path.ends_with(name)));
     paths
 }
 
