@@ -118,14 +118,15 @@ fn a_robot_with_four_legs_stands() {
     assert!(rig("agents/humanoid.xml").hold.is_none(), "two legs need balance");
 }
 
-/// A file as robots come: no ground, soft feet, a solver with one iteration, motors.
+/// A file as robots come: a wall but no floor, soft feet, a solver with one iteration, motors.
 #[test]
 fn a_bare_model_is_made_ready() {
     let quadruped = std::fs::read_to_string(asset("agents/quadruped.xml")).expect("the model");
     let mut bare = quadruped.clone();
+    let wall = r#"<geom type="plane" size="1 1 .1" pos="3 0 2" zaxis="-1 0 0" contype="1" conaffinity="1"/>"#;
     for (old, new) in [
         (r#"<option timestep="0.004" integrator="implicitfast"/>"#, r#"<option timestep="0.002" iterations="1"/>"#),
-        (r#"<geom name="floor" type="plane" size="0 0 0.05" contype="1" conaffinity="1"/>"#, ""),
+        (r#"<geom name="floor" type="plane" size="0 0 0.05" contype="1" conaffinity="1"/>"#, wall),
         (r#"friction="0.7"/>"#, r#"friction="0.4" margin="0.001" solimp="0.015 1 0.03"/>"#),
         (r#"kp="38" forcerange="-24 24" inheritrange="1"/>"#, r#"kp="38"/><motor ctrlrange="-24 24"/>"#),
         (r#"<position forcerange="-36 36"/>"#, r#"<motor ctrlrange="-36 36"/>"#),

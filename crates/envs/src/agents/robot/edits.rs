@@ -1,10 +1,10 @@
 //! The changes that make a model ready to learn: names for all geoms and actuators, ground, a time step, and hard feet.
 
 use marathon_physics::mjcf::MjcfError;
-use marathon_physics::model::{GeomType, Integrator, Model};
+use marathon_physics::model::{Integrator, Model};
 use marathon_physics::spec::{Geom, Kind, ModelSpec};
 
-use super::stance::Foot;
+use super::stance::{self, Foot};
 
 /// Seconds between decisions.
 const DECISION: f64 = 0.02;
@@ -45,8 +45,7 @@ pub fn prepare(spec: &mut ModelSpec, given: &Model) -> Result<(), MjcfError> {
     }
     // a whole number of steps per decision
     option.set("timestep", DECISION / (DECISION / step).ceil())?;
-    let is_ground = |kind: GeomType| matches!(kind, GeomType::Plane | GeomType::Hfield);
-    if !given.geoms.iter().any(|geom| is_ground(geom.kind) && given.bodies[geom.body].weld_id == 0) {
+    if !stance::has_ground(given) {
         spec.add_first_to("world", Geom::plane().set("size", [0.0, 0.0, 1.0]).collision(1, 1))?;
     }
     Ok(())

@@ -239,20 +239,25 @@ fn spread(model: &Model, pose: &Pose, drive: &Drive, legs: &[usize]) -> f64 {
 impl fmt::Display for Rig {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let model = &self.model;
+        let name = |body: usize| match model.bodies[body].name.as_str() {
+            "" => format!("body {body}"),
+            name => name.to_owned(),
+        };
         let root = match self.root {
             Root::Free { .. } => "moves freely",
             Root::Planar { .. } => "moves in the plane of x and z",
         };
-        let body = &model.bodies[self.body].name;
         writeln!(
             f,
-            "root       {body}: {root}, {:.3} m above the ground, {:.1} kg",
-            self.height, model.bodies[self.body].subtree_mass
+            "root       {}: {root}, {:.3} m above the ground, {:.1} kg",
+            name(self.body),
+            self.height,
+            model.bodies[self.body].subtree_mass
         )?;
         writeln!(f, "pose       {}", self.changes.pose)?;
         let names = self.feet.iter().map(|(foot, phase)| match self.clock {
-            true => format!("{} ({phase})", model.bodies[foot.body].name),
-            false => model.bodies[foot.body].name.clone(),
+            true => format!("{} ({phase})", name(foot.body)),
+            false => name(foot.body),
         });
         let names: Vec<String> = names.collect();
         match names.as_slice() {

@@ -1,6 +1,6 @@
 //! How a robot stands: the pose, the ground under it, and the bodies that carry it.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use marathon_motion::kinematics::Pose;
 use marathon_physics::model::{Geom, GeomType, JointType, Model};
 
@@ -12,6 +12,8 @@ const INIT_QPOS: &str = "init_qpos";
 const MARGIN: f64 = 0.05;
 /// A limb reaches the ground if its end is at most this part of the root's height above it.
 const REACH: f64 = 0.15;
+/// Least cosine of the slope of a plane that is ground.
+const LEVEL: f64 = 0.99;
 /// Without legs the root or its neighbors lie on the ground, this close (part of the height, and meters).
 const LYING: f64 = 0.02;
 
@@ -102,10 +104,15 @@ fn collides(geom: &Geom) -> bool {
     geom.contype != 0 || geom.conaffinity != 0
 }
 
+/// The orientation of a geom in the world.
+fn turn(pose: &Pose, geom: &Geom) -> DQuat {
+    let [w, x, y, z] = geom.quat;
+    pose.quat[geom.body] * DQuat::from_xyzw(x, y, z, w)
+}
+
 /// The lowest point of a geom, m.
 fn lowest(model: &Model, pose: &Pose, geom: &Geom) -> DVec3 {
-    let [w, x, y, z] = geom.quat;
-    let turn = pose.quat[geom.body] * glam::DQuat::from_xyzw(x, y, z, w);
+    let turn = turn(pose, geom);
     let center = pose.point(geom.body, DVec3::from_array(geom.pos));
     // downward, in the geom's own axes
     let down = turn.inverse() * DVec3::NEG_Z;
@@ -231,8 +238,20 @@ fn named_foot(model: &Model, name: &str) -> Result<usize, String> {
 /// Height of the highest level plane of the world, m; 0 without one.
 pub fn ground_height(model: &Model) -> f64 {
     let pose = Pose::of(model, &model.qpos0);
-    let planes = model.geoms.iter().filter(|g| g.kind == GeomType::Plane && model.bodies[g.body].weld_id == 0);
+    let planes = model.geoms.iter().filter(|geom| is_floor(model, &pose, geom));
     planes.map(|g| pose.point(g.body, DVec3::from_array(g.pos)).z).max_by(f64::total_cmp).unwrap_or(0.0)
+}
+
+/// Whether the world has ground: a level plane or a height field.
+pub fn has_ground(model: &Model) -> bool {
+    let pose = Pose::of(model, &model.qpos0);
+    let is_field = |geom: &Geom| geom.kind == GeomType::Hfield && model.bodies[geom.body].weld_id == 0;
+    model.geoms.iter().any(|geom| is_field(geom) || is_floor(model, &pose, geom))
+}
+
+/// Whether a geom is a level plane of the world. Walls are planes, too.
+fn is_floor(model: &Model, pose: &Pose, geom: &Geom) -> bool {
+    geom.kind == GeomType::Plane && model.bodies[geom.body].weld_id == 0 && (turn(pose, geom) * DVec3::Z).z > LEVEL
 }
 
 /// When each foot steps: the part of the clock's turn by which it is late. Feet that follow each other alternate, and so do the
