@@ -17,6 +17,9 @@ for tool in rustup node npm; do
   fi
 done
 rustup --quiet target add wasm32-unknown-unknown
+# modules do not contain the paths of this computer
+root="$(cd ../.. && pwd)"
+paths=("--remap-path-prefix=$root=marathon" "--remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}=cargo")
 
 mkdir -p npm/dist
 for module in "${@:-relaxed exact relaxed-play exact-play}"; do
@@ -26,8 +29,10 @@ for module in "${@:-relaxed exact relaxed-play exact-play}"; do
     [ "$lanes" = "$name" ] || options=(--no-default-features)
     echo "crates/wasm/build.sh: $name.wasm" >&2
     # LLVM's vectorizers would add relaxed instructions of their own, whose results differ between processors
+    flags=("-Ctarget-feature=$features" -Cno-vectorize-loops -Cno-vectorize-slp "${paths[@]}")
+    # of all forms of flags, cargo takes this one first
     env -u RUSTC_WORKSPACE_WRAPPER CARGO_TARGET_DIR="$target/$lanes" \
-      RUSTFLAGS="-C target-feature=$features -C no-vectorize-loops -C no-vectorize-slp" \
+      CARGO_ENCODED_RUSTFLAGS="$(IFS=$'\x1f' && echo -n "${flags[*]}")" \
       cargo build --quiet --locked --profile web --target wasm32-unknown-unknown -p marathon-wasm "${options[@]}"
     cp "$target/$lanes/wasm32-unknown-unknown/web/marathon_wasm.wasm" "npm/dist/$name.wasm"
   done

@@ -1,7 +1,10 @@
 """A browser can watch an environment that Python steps."""
 
 import json
+import os
 import struct
+import subprocess
+import sys
 import time
 import urllib.error
 import urllib.request
@@ -125,3 +128,24 @@ def test_python_classes_cannot_be_shown():
     env.reset(seed=1)
     with pytest.raises(NotImplementedError, match="Python class"):
         env.show()
+
+
+def test_a_package_with_a_page_offers_it_to_the_command(tmp_path):
+    """Wheels of a release hold the page, which the source tree does not."""
+    package = tmp_path / "marathon_rl"
+    package.mkdir()
+    for part in Path(marathon_rl.__file__).parent.iterdir():
+        if part.name != "page":
+            (package / part.name).symlink_to(part)
+    (package / "page").mkdir()
+    (package / "page/index.html").write_text("<p>the page")
+    environment = {name: value for name, value in os.environ.items() if name != "MARATHON_PAGE"}
+    code = "import os; from marathon_rl import _native; _native.main(['marathon', '--version']); "
+    told = subprocess.run(
+        [sys.executable, "-c", code + "print(os.environ['MARATHON_PAGE'])"],
+        env={**environment, "PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert told.stdout.splitlines()[-1:] == [str(package / "page")], told.stderr

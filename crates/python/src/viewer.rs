@@ -165,7 +165,7 @@ impl Shown {
 /// Names the page of the package to the `marathon` command, unless the environment variable names another one.
 pub fn offer_page(py: Python<'_>) -> PyResult<()> {
     if let Some(page) = packed_page(py) {
-        py.import("os")?.getattr("environ")?.set_item(PAGE_VARIABLE, page)?;
+        py.import("os")?.getattr("environ")?.set_item(PAGE_VARIABLE, page.into_os_string())?;
     }
     Ok(())
 }
