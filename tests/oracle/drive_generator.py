@@ -30,9 +30,8 @@ def target(g):
     return {"site": first, "refsite": second if kind == "refsite" else None, "gear": gear}
 
 
-def actuator(g):
-    a = {"name": g.name("d"), **target(g)}
-    form = g.pick("motor", "position", "velocity", "general", "muscle")
+def add_law(g, form, a):
+    """Adds the law of a servo or a general actuator to the attributes `a`."""
     if form == "position":
         a.update(kp=g.log(0.5, 50), kv=g.maybe(0.5, lambda: g.log(0.05, 3)))
         if a["kv"] is None:
@@ -41,7 +40,21 @@ def actuator(g):
         a["kv"] = g.log(0.05, 5)
     elif form == "general":
         a.update(gaintype="affine", gainprm=g.vector(2.0) * [1, 1, 0.2], biastype="affine", biasprm=g.vector(2.0) * [1, 1, 0.3])
-    elif form == "muscle":
+
+
+def add_force_range(g, a):
+    """Adds a range of forces now and then."""
+    if g.maybe(0.25):
+        a["forcerange"] = [-g.u(0.5, 5), g.u(0.5, 5)]
+        if not g.autolimits:
+            a["forcelimited"] = True
+
+
+def actuator(g):
+    a = {"name": g.name("d"), **target(g)}
+    form = g.pick("motor", "position", "velocity", "general", "muscle")
+    add_law(g, form, a)
+    if form == "muscle":
         # the element itself has no sites
         low, numbers = g.u(0.5, 0.9), [g.log(1, 20), 1, g.u(0.3, 0.7), g.u(1.3, 1.9), g.u(0.8, 5), g.u(0.5, 1.5), g.u(1.1, 1.6)]
         a.update(gaintype="muscle", biastype="muscle", gainprm=[low, g.u(1.0, 1.3), *numbers], biasprm=[low, g.u(1.0, 1.3), *numbers])
@@ -49,8 +62,5 @@ def actuator(g):
         a["lengthrange"] = [shortest, shortest + g.u(0.3, 1.5)]
         a.update(dyntype="muscle", dynprm=[g.log(0.005, 0.1), g.log(0.01, 0.2), g.pick(0, g.u(0.05, 0.5))])
         form = "general"
-    if g.maybe(0.25):
-        a["forcerange"] = [-g.u(0.5, 5), g.u(0.5, 5)]
-        if not g.autolimits:
-            a["forcelimited"] = True
+    add_force_range(g, a)
     return form, a

@@ -5,6 +5,8 @@ They come last and from their own random stream, so that the rest of a seed's mo
 
 import numpy as np
 
+import drive_generator
+
 
 def sections(g, seed, element):
     """Returns lists of elements by section: `tendon`, `actuator`, `equality`, `sensor`. `g` is the generator."""
@@ -64,21 +66,12 @@ class Strings:
         g = self.g
         form = g.pick("motor", "position", "velocity", "general")
         a = {"name": g.name("p"), "tendon": tendon, "gear": g.maybe(0.4, lambda: g.vector(2.0, 1))}
-        if form == "position":
-            a.update(kp=g.log(0.5, 50), kv=g.maybe(0.5, lambda: g.log(0.05, 3)))
-            if a["kv"] is None:
-                a["dampratio"] = g.maybe(0.3, lambda: g.u(0.2, 1.5))
-        elif form == "velocity":
-            a["kv"] = g.log(0.05, 5)
-        elif form == "general":
-            a.update(gaintype="affine", gainprm=g.vector(2.0) * [1, 1, 0.2], biastype="affine", biasprm=g.vector(2.0) * [1, 1, 0.3])
+        drive_generator.add_law(g, form, a)
+        if form == "general":
             a["dyntype"] = g.maybe(0.3, lambda: g.pick("integrator", "filter", "filterexact"))
             if a["dyntype"] in ("filter", "filterexact"):
                 a["dynprm"] = g.log(0.005, 0.3)
-        if g.maybe(0.25):
-            a["forcerange"] = [-g.u(0.5, 5), g.u(0.5, 5)]
-            if not g.autolimits:
-                a["forcelimited"] = True
+        drive_generator.add_force_range(g, a)
         return form, a
 
     def equality(self, names):

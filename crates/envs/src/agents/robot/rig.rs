@@ -213,6 +213,11 @@ impl Rig {
         }
     }
 
+    /// Seconds between decisions.
+    pub fn dt(&self) -> f64 {
+        self.model.opt.timestep * self.frame_skip as f64
+    }
+
     /// The unit of speeds, sqrt(g H), m/s. In this unit, robots of all sizes walk at about the same speed.
     pub fn pace(&self) -> f64 {
         (self.gravity * self.height).sqrt()

@@ -60,15 +60,16 @@ fn servo_joint(model: &Model, actuator: &Compiled) -> Option<usize> {
     (holds && actuator.dynamics == Dynamics::None).then_some(joint)
 }
 
-/// Largest torque at a joint, if it is limited.
-fn strength(model: &Model, actuator: &Compiled, joint: usize) -> Option<f64> {
+/// Largest torque at a joint. Without a limit it follows from the robot's weight and height.
+fn strength(model: &Model, actuator: &Compiled, joint: usize, height: f64) -> f64 {
     let gear = actuator.gear[0].abs();
     let most = |[low, high]: [f64; 2]| low.abs().max(high.abs());
     let by_control = (actuator.ctrl_limited && actuator.bias == [0.0; 3])
         .then(|| actuator.gain[0].abs() * gear * most(actuator.ctrl_range));
     let by_force = actuator.force_limited.then(|| gear * most(actuator.force_range));
     let by_joint = model.joints[joint].actuator_force_range.map(most);
-    [by_control, by_force, by_joint].into_iter().flatten().filter(|x| *x > 0.0).min_by(f64::total_cmp)
+    let limits = [by_control, by_force, by_joint].into_iter().flatten().filter(|x| *x > 0.0);
+    limits.min_by(f64::total_cmp).unwrap_or_else(|| weight(model) * height * UNLIMITED)
 }
 
 /// Replaces the motors of a model, which have names, by servos `ratio` times as stiff as they are strong, per radian. Returns how
@@ -80,7 +81,7 @@ pub fn replace_motors(spec: &mut ModelSpec, height: f64, ratio: f64) -> Result<u
         let Some(index) = motor_joint(&model, actuator) else { continue };
         let joint = &model.joints[index];
         let dof = &model.dofs[joint.dof_adr];
-        let most = strength(&model, actuator, index).unwrap_or_else(|| weight(&model) * height * UNLIMITED);
+        let most = strength(&model, actuator, index, height);
         // a servo much quicker than the steps would shake
         let inertia = 1.0 / dof.invweight0.max(1e-9);
         let stiffness = (ratio * most).min(inertia * (QUICKEST / model.opt.timestep).powi(2));
@@ -112,7 +113,7 @@ pub fn drives(model: &Model, qpos: &[f64], height: f64, scale: Option<f64>) -> V
         };
         let (joint, gear) = (&model.joints[index], actuator.gear[0]);
         let stiffness = actuator.gain[0] * gear * gear;
-        let strength = strength(model, actuator, index).unwrap_or_else(|| weight(model) * height * UNLIMITED);
+        let strength = strength(model, actuator, index, height);
         let [low, high] = joint.range;
         let room = if joint.limited { 0.5 * (high - low) } else { f64::INFINITY };
         let found = match joint.kind {

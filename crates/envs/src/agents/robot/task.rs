@@ -128,7 +128,7 @@ fn bell<T: Real>(square: T) -> T {
 impl Agent for Robot {
     fn facts(&self) -> Facts {
         let rig = &self.rig;
-        let dt = rig.model.opt.timestep * rig.frame_skip as f64;
+        let dt = rig.dt();
         let range = |name: &str, most: f64, unit: &str| CommandRange::new(name, -most..=most, unit);
         let [ahead, side, turn] = rig.fastest;
         let speed = CommandRange::new("speed", -BACK * ahead..=ahead, "m/s");
@@ -177,7 +177,7 @@ impl Agent for Robot {
     }
 
     fn command(&self, random: &mut EpisodeRng, _: usize, out: &mut [f64]) -> usize {
-        let dt = self.rig.model.opt.timestep * self.rig.frame_skip as f64;
+        let dt = self.rig.dt();
         let [stands, straight] = KINDS;
         let kind = random.uniform(0.0, 1.0);
         for (i, out) in out.iter_mut().enumerate() {
