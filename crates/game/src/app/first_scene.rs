@@ -35,9 +35,11 @@ pub fn scenario(args: &Args, shipped: &ShippedPolicies) -> Result<Scenario, Game
     let path = Path::new(what);
     let is_model = path.extension().is_some_and(|e| e == "xml" || e == "mjcf");
     let robot = registry::robot_options(what).is_some();
+    // the file of a robot is a task if it is to learn or has learned, and a model to try otherwise
+    if robot && args.policy.is_none() && args.mode != Mode::Learn {
+        return testbed(scenario, path, args);
+    }
     let given = match (&args.policy, registry::agent(what)) {
-        // the file of a robot is a task if it is to learn or has learned, and a model to try otherwise
-        (None, _) if robot && args.mode != Mode::Learn => return testbed(scenario, path, args),
         (_, Ok(agent)) => {
             scenario.agent = if robot { what.into() } else { agent.facts().id };
             args.policy.clone()
