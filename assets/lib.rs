@@ -63,6 +63,7 @@ pub const FILES: &[(&str, &[u8])] = files![
     "motions/marathon_man/walk_right.motion",
     "motions/walker2d/run.motion",
     "motions/walker2d/walk.motion",
+    "props/boxes.xml",
     "skins/marathon_man.glb",
 ];
 

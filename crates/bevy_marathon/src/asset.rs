@@ -7,6 +7,7 @@ use marathon_learn::Policy;
 use marathon_physics::Model;
 use marathon_physics::budget::{self, Limit};
 use marathon_physics::mjcf::MjcfError;
+use marathon_physics::spec::{Kind, ModelSpec};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -84,7 +85,7 @@ impl AssetLoader for MjcfLoader {
         let mut files: BTreeMap<String, Vec<u8>> = BTreeMap::new();
         loop {
             let missed = RefCell::new(None);
-            let result = Model::from_xml_str_with(&text, &name, &|file| {
+            let result = compile(&text, &name, &|file| {
                 let known = files.get(file).cloned();
                 known.ok_or_else(|| {
                     *missed.borrow_mut() = Some(file.to_string());
@@ -106,6 +107,16 @@ impl AssetLoader for MjcfLoader {
     fn extensions(&self) -> &[&str] {
         &["xml", "mjcf"]
     }
+}
+
+/// Compiles a model, with a geom for obstacles unless its own geoms need the name.
+fn compile(text: &str, name: &str, resolve: &dyn Fn(&str) -> Result<Vec<u8>, String>) -> Result<Model, MjcfError> {
+    let mut spec = ModelSpec::from_xml_str_with(text, name, resolve)?;
+    let taken = spec.get(Kind::Geom, "obstacles").is_ok();
+    if !taken {
+        spec.add_obstacles()?;
+    }
+    spec.compile_with(resolve)
 }
 
 /// Loads [`PolicyAsset`]s.

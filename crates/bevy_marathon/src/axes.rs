@@ -23,6 +23,12 @@ pub fn turn_to_game(q: [f64; 4]) -> Quat {
     Quat::from_xyzw(axis.x, axis.y, axis.z, q[0] as f32).normalize()
 }
 
+/// An orientation of the game in the axes of the physics, `[w, x, y, z]`.
+pub fn turn_to_physics(q: Quat) -> [f64; 4] {
+    let [x, y, z] = to_physics(q.xyz());
+    [f64::from(q.w), x, y, z]
+}
+
 /// A place of the physics, a position and an orientation, in the game's axes.
 pub fn place_to_game(pos: [f64; 3], quat: [f64; 4]) -> Transform {
     Transform::from_translation(to_game(pos)).with_rotation(turn_to_game(quat))
@@ -45,5 +51,6 @@ mod tests {
         let turned = std::array::from_fn(|i| v[i] + 2.0 * q[0] * once[i] + 2.0 * twice[i]);
         assert!(turn_to_game(q).mul_vec3(to_game(v)).distance(to_game(turned)) < 1e-6);
         assert_eq!(to_physics(to_game(v)).map(|x| x as f32), v.map(|x| x as f32));
+        assert!(turn_to_physics(turn_to_game(q)).iter().zip(q).all(|(a, b)| (a - b).abs() < 1e-6));
     }
 }

@@ -21,6 +21,12 @@ pub enum RagdollError {
     /// A body without a task takes no commands.
     #[error("a body without a task takes no command")]
     NoCommand,
+    /// The model of a prefab that shall collide has no geom for obstacles.
+    #[error("the model '{model}' has no geom for obstacles; call ModelSpec::add_obstacles before it is compiled")]
+    NoObstacles {
+        /// Name of the model.
+        model: String,
+    },
     /// A body without a task has no ground of its own.
     #[error("a body without a task has no ground of its own")]
     NoGround,

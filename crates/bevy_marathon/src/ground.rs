@@ -104,14 +104,27 @@ impl Ground {
     /// # Errors
     /// The same, or if it does not take an argument or its value.
     pub fn agent_with(self, name: &str, options: &Options) -> Result<Arc<dyn AnyAgent>, EnvError> {
+        self.colliding_agent(name, options, false)
+    }
+
+    /// The same. If it `collides`, its model has a geom for obstacles.
+    pub(crate) fn colliding_agent(
+        self,
+        name: &str,
+        options: &Options,
+        collides: bool,
+    ) -> Result<Arc<dyn AnyAgent>, EnvError> {
         // an argument may change the model, which the ground becomes a part of
         let agent = registry::agent(name)?.with_options(options)?;
-        if self == Ground::Level {
+        if self == Ground::Level && !collides {
             return Ok(agent);
         }
         let facts = agent.facts();
         let refused = |source| EnvError::Model { id: facts.id.clone(), source: Box::new(source) };
         let mut spec = facts.model.spec(&facts.id).map_err(refused)?;
+        if collides {
+            spec.add_obstacles().map_err(refused)?;
+        }
         if !self.lay(&mut spec).map_err(refused)? {
             let problem = "its model has no level floor of its own, which a course could replace";
             return Err(EnvError::Agent { id: facts.id, problem: problem.into() });
@@ -120,19 +133,26 @@ impl Ground {
     }
 
     /// A registry that has an agent on this ground, and the arguments that are still to be given to it.
-    pub(crate) fn registry(self, name: &str, options: &Options) -> Result<(Registry, Options), EnvError> {
-        if self == Ground::Level {
+    pub(crate) fn registry(
+        self,
+        name: &str,
+        options: &Options,
+        collides: bool,
+    ) -> Result<(Registry, Options), EnvError> {
+        if self == Ground::Level && !collides {
             return Ok((registry::global(), options.clone()));
         }
         let mut registry = Registry::empty();
-        registry.register(self.agent_with(name, options)?)?;
+        registry.register(self.colliding_agent(name, options, collides)?)?;
         Ok((registry, Options::new()))
     }
 
     /// Lays this ground into a model. `false`: the model has no floor that it could replace.
     fn lay(self, spec: &mut ModelSpec) -> Result<bool, MjcfError> {
-        if self == Ground::Track {
-            return lay_track(spec);
+        match self {
+            Ground::Level => return Ok(true),
+            Ground::Track => return lay_track(spec),
+            Ground::Hills | Ground::Stairs | Ground::Boards => {}
         }
         let points = ((LENGTH + BEHIND) / GRID).round() as usize + 1;
         let heights: Vec<f64> = (0..points).map(|i| self.height(i as f64 * GRID - BEHIND)).collect();

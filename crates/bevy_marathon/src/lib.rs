@@ -53,6 +53,7 @@ pub mod asset;
 pub mod axes;
 mod characters;
 mod command;
+mod contact;
 mod direction;
 mod error;
 mod ground;
@@ -64,6 +65,7 @@ pub mod look;
 mod marathon;
 mod messages;
 mod mode;
+mod obstacle;
 mod place;
 mod plugin;
 pub mod pose;
@@ -84,6 +86,7 @@ pub use lod::{Lod, LodByDistance};
 pub use marathon::{Marathon, RagdollState};
 pub use messages::*;
 pub use mode::RagdollMode;
+pub use obstacle::{Collides, Obstacle, ObstacleMotion};
 pub use place::CharacterPose;
 pub use plugin::{MarathonPlugin, MarathonSystems};
 pub use ragdoll::*;
@@ -102,9 +105,9 @@ pub mod prelude {
     pub use crate::plugin::{MarathonPlugin, MarathonSystems};
     pub use crate::ragdoll::*;
     pub use crate::{
-        AgentCommand, CharacterPose, CommandError, Ground, HitReactions, LimbStrength, Lod, LodByDistance, Marathon,
-        MarathonSnapshot, MoveDirection, PolicyAsset, RagdollError, RagdollMode, RagdollPrefab, RagdollSnapshot,
-        RagdollState, SnapshotError, StrengthError,
+        AgentCommand, CharacterPose, Collides, CommandError, Ground, HitReactions, LimbStrength, Lod, LodByDistance,
+        Marathon, MarathonSnapshot, MoveDirection, Obstacle, PolicyAsset, RagdollError, RagdollMode, RagdollPrefab,
+        RagdollSnapshot, RagdollState, SnapshotError, StrengthError,
     };
     pub use marathon_physics::Variation;
     pub use marathon_runs::TaskConfig;

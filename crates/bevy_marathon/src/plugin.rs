@@ -3,6 +3,7 @@
 use crate::actuation;
 use crate::asset::{MjcfLoader, PolicyAsset, PolicyLoader, RagdollPrefab};
 use crate::command::AgentCommand;
+use crate::contact;
 use crate::direction::{self, MoveDirection};
 use crate::levels;
 use crate::lod::{Lod, LodByDistance};
@@ -12,6 +13,7 @@ use crate::messages::{
     SkillStarted, TargetReached,
 };
 use crate::mode::RagdollMode;
+use crate::obstacle::{Collides, Obstacle};
 use crate::place::{self, CharacterPose};
 use crate::ragdoll::{
     CharacterPolicy, Controls, Episode, Held, LaidGround, Opponent, OwnGround, Part, Physique, Ragdoll, Restart, Target,
@@ -66,6 +68,7 @@ impl Plugin for MarathonPlugin {
                         levels::by_distance,
                         simulate::take_in,
                         actuation::take_in,
+                        contact::feel,
                         simulate::push,
                         levels::pack,
                     )
@@ -105,6 +108,8 @@ fn register_types(app: &mut App) {
         .register_type::<AgentCommand>()
         .register_type::<MoveDirection>()
         .register_type::<LaidGround>()
+        .register_type::<Obstacle>()
+        .register_type::<Collides>()
         .register_type::<Lod>()
         .register_type::<LodByDistance>()
         .register_type::<Target>()

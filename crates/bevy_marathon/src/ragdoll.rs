@@ -5,6 +5,7 @@ use crate::error::RagdollError;
 use crate::ground::Ground;
 use crate::lod::Lod;
 use crate::mode::RagdollMode;
+use crate::obstacle::Collides;
 use crate::strength::LimbStrength;
 use bevy::prelude::*;
 use bevy::reflect::reflect_remote;
@@ -21,7 +22,7 @@ use std::sync::Arc;
 /// ragdolls of the world.
 #[derive(Component, Clone, Debug, Reflect)]
 #[reflect(Component, Clone, Debug)]
-#[require(Transform, Episode, Restart, OwnGround, Lod, RagdollMode, LimbStrength)]
+#[require(Transform, Episode, Restart, OwnGround, Lod, RagdollMode, LimbStrength, Collides)]
 pub struct Ragdoll {
     /// Kind of the ragdoll.
     pub character: Character,

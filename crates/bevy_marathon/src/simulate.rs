@@ -9,6 +9,7 @@ use crate::ground::Ground;
 use crate::lod::Lod;
 use crate::marathon::{Marathon, RagdollState};
 use crate::messages::{EpisodeBegan, Push, RestartNow, TargetReached};
+use crate::obstacle::Collides;
 use crate::place::CharacterPose;
 use crate::pose;
 use crate::ragdoll::{
@@ -36,19 +37,19 @@ pub(crate) fn admit(
     prefabs: Res<Assets<RagdollPrefab>>,
     (policies, server): (Res<Assets<PolicyAsset>>, Res<AssetServer>),
     new: Query<
-        (Entity, &Ragdoll, &Restart, &LimbStrength, Option<&CharacterPolicy>, Option<&AgentCommand>),
+        (Entity, &Ragdoll, (&Restart, &Collides), &LimbStrength, Option<&CharacterPolicy>, Option<&AgentCommand>),
         (Without<RagdollState>, Without<Unfit>),
     >,
 ) {
     // the tick that begins here shows times from `now` on; its elapsed time is that of its end
     marathon.now = time.elapsed();
-    for (entity, ragdoll, restart, strength, policy, command) in &new {
+    for (entity, ragdoll, (restart, collides), strength, policy, command) in &new {
         let meta = policy.and_then(|policy| policies.get(&policy.0)).map(|asset| asset.0.meta());
         let loads = |policy: &CharacterPolicy| matches!(server.load_state(&policy.0), LoadState::Loading);
         if ragdoll.task_config.is_none() && meta.is_none() && policy.is_some_and(loads) {
             continue;
         }
-        match enter(&mut marathon, &prefabs, ragdoll, meta, *restart) {
+        match enter(&mut marathon, &prefabs, ragdoll, meta, (*restart, collides.any())) {
             Ok(Some(key)) => {
                 let kind = &marathon.kinds[key.kind];
                 let mut entity = commands.entity(entity);
@@ -70,7 +71,7 @@ fn enter(
     prefabs: &Assets<RagdollPrefab>,
     ragdoll: &Ragdoll,
     policy: Option<&PolicyMeta>,
-    restart: Restart,
+    (restart, collides): (Restart, bool),
 ) -> Result<Option<RagdollState>, RagdollError> {
     let now = marathon.now;
     let ground = match ragdoll.character {
@@ -78,15 +79,16 @@ fn enter(
         Character::Prefab(_) => Ground::Level,
     };
     let task_config = task_config(ragdoll, policy)?;
-    let same =
-        |h: &CharacterKind| h.character == ragdoll.character && h.ground == ground && h.task_config == task_config;
+    let same = |h: &CharacterKind| {
+        (&h.character, h.ground, h.collides) == (&ragdoll.character, ground, collides) && h.task_config == task_config
+    };
     let number = match marathon.kinds.iter().position(same) {
         Some(number) => number,
         None => {
             let kind = match &ragdoll.character {
-                Character::Agent(name) => CharacterKind::of_agent(name, &task_config, ground, now)?,
+                Character::Agent(name) => CharacterKind::of_agent(name, &task_config, (ground, collides), now)?,
                 Character::Prefab(handle) => match prefabs.get(handle) {
-                    Some(prefab) => CharacterKind::of_prefab(handle, prefab.model.clone(), now),
+                    Some(prefab) => CharacterKind::of_prefab(handle, prefab.model.clone(), collides, now)?,
                     None => return Ok(None),
                 },
             };

@@ -11,6 +11,9 @@ mod headless_server;
 #[allow(dead_code, reason = "its window stays closed")]
 #[path = "../examples/hit_reactions.rs"]
 mod hit_reactions;
+#[allow(dead_code, reason = "its window stays closed")]
+#[path = "../examples/obstacles.rs"]
+mod obstacles;
 #[path = "../examples/own_character.rs"]
 mod own_character;
 #[allow(dead_code, reason = "its window stays closed")]
@@ -71,6 +74,28 @@ fn the_humanoid_runs() {
         world.query::<&Episode>().iter(world).any(|episode| episode.farthest > 1.0)
     });
     assert_eq!(app.world_mut().query::<&FollowCamera>().iter(app.world()).count(), 1);
+}
+
+#[test]
+fn the_yard_keeps_its_characters() {
+    let mut app = windowless(obstacles::yard);
+    run_until(&mut app, "eight characters and boxes", |world| world.query::<&Anatomy>().iter(world).count() == 9);
+    let start = app.world().resource::<Time>().elapsed_secs();
+    let mut moved = false;
+    while app.world().resource::<Time>().elapsed_secs() < start + 20.0 {
+        app.update();
+        let world = app.world_mut();
+        for (part, place) in world.query::<(&Part, &GlobalTransform)>().iter(world) {
+            let (at, is_box) = (
+                place.translation(),
+                world.get::<Ragdoll>(part.ragdoll).is_some_and(|r| r.task_config.is_none() && r.seed == 0),
+            );
+            assert!(part.body == 0 || at.is_finite() && at.abs().max_element() < 6.5, "{at} at {:?}", part);
+            moved |= is_box && part.body == 1 && (at - Vec3::new(0.0, 0.15, 0.33)).length() > 0.1;
+        }
+    }
+    assert!(moved, "nobody has moved a box");
+    assert_eq!(app.world_mut().query::<&Unfit>().iter(app.world()).count(), 0);
 }
 
 #[test]

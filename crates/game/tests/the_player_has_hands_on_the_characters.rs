@@ -9,7 +9,8 @@ use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_marathon::prelude::*;
 use marathon_game::app::{
-    Action, ActionPressed, Actor, Dragged, FilmProgram, FilmReel, Notifications, PlaySound, Recording, Sound,
+    Action, ActionPressed, Actor, Dragged, FilmProgram, FilmReel, LoadScenario, Notifications, Pile, PlaySound,
+    Recording, Sound,
 };
 use std::error::Error;
 use std::path::PathBuf;
@@ -168,6 +169,56 @@ fn a_key_keeps_the_last_ten_seconds_as_a_film() -> Result<(), Box<dyn Error>> {
     let path = notes.iter().find(|note| note.text.starts_with("film: ")).ok_or("the place of the film is named")?;
     assert!(path.text.contains(&folder.path().display().to_string()), "{}", path.text);
     Ok(())
+}
+
+#[test]
+fn a_pile_of_boxes_is_run_into() -> Result<(), Box<dyn Error>> {
+    let mut app = game(&["MarathonManController", "--mode", "push"]);
+    frames(&mut app, 50);
+    act(&mut app, Action::Boxes);
+    frames(&mut app, 50);
+    let mut piles = app.world_mut().query_filtered::<Entity, With<Pile>>();
+    let first = piles.single(app.world())?;
+    let start = boxes(&mut app, first);
+    assert_eq!(start.len(), 6);
+    assert!(start.iter().all(|at| at.y > 0.1 && at.y < 0.8), "{start:?}");
+    // the same key puts them in front of the character again
+    act(&mut app, Action::Boxes);
+    frames(&mut app, 2);
+    let pile = piles.single(app.world())?;
+    assert_ne!(pile, first);
+    let start = boxes(&mut app, pile);
+    let way = *app.world_mut().query_filtered::<&Transform, With<Pile>>().single(app.world())?;
+    let mut runner = app.world_mut().query_filtered::<Entity, With<Actor>>();
+    let runner = runner.single(app.world())?;
+    app.world_mut().entity_mut(runner).insert(MoveDirection::new(0.6 * *way.right()));
+    frames(&mut app, 300);
+    let now = boxes(&mut app, pile);
+    let moved = start.iter().zip(&now).filter(|(a, b)| a.distance(**b) > 0.2).count();
+    assert!(moved >= 2, "{moved} boxes have moved: {now:?}");
+    assert!(now.iter().all(|at| at.is_finite() && at.y > 0.0 && at.length() < 20.0), "{now:?}");
+    app.world_mut().write_message(LoadScenario);
+    frames(&mut app, 3);
+    assert_eq!(piles.iter(app.world()).count(), 0);
+    Ok(())
+}
+
+/// Where the boxes of a pile are.
+fn boxes(app: &mut App, pile: Entity) -> Vec<Vec3> {
+    let mut parts = app.world_mut().query::<(&Part, &GlobalTransform)>();
+    let of = parts.iter(app.world()).filter(|(part, _)| part.ragdoll == pile && part.body > 0);
+    let mut places: Vec<(usize, Vec3)> = of.map(|(part, at)| (part.body, at.translation())).collect();
+    places.sort_by_key(|(body, _)| *body);
+    places.into_iter().map(|(_, at)| at).collect()
+}
+
+#[test]
+fn boxes_are_for_characters_that_are_played_with() {
+    let mut app = game(&["AntController", "--mode", "course"]);
+    frames(&mut app, 20);
+    act(&mut app, Action::Boxes);
+    frames(&mut app, 2);
+    assert_eq!(app.world_mut().query_filtered::<(), With<Pile>>().iter(app.world()).count(), 0);
 }
 
 #[test]

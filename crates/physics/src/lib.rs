@@ -74,6 +74,6 @@ pub use mjcf::spec;
 pub use model::Model;
 pub use readings::{MeasurePlan, Readings};
 pub use sim::{Sim, SimError, SimOptions};
-pub use state::{AgentState, Group, SolverStats, Variation, Work};
+pub use state::{AgentState, Group, Obstacle, ObstacleShape, SolverStats, Variation, Work};
 #[doc(hidden)]
 pub use step::Stage;

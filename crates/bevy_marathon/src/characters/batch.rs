@@ -12,7 +12,7 @@ use bevy::prelude::*;
 use marathon_envs::{AgentState, Autoreset, BLOCK, Role, Step, VecEnv, VecEnvOptions};
 use marathon_learn::{BlockPolicy, Policy};
 use marathon_physics::lanes::Isa;
-use marathon_physics::{Batch, BatchOptions, Model, Variation};
+use marathon_physics::{Batch, BatchOptions, Model, Obstacle, Variation};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -54,7 +54,7 @@ impl CharacterBatch {
         let (engine, n_obs, out) = match &kind.character {
             Character::Agent(name) => {
                 let (task_config, id) = (&kind.task_config, kind.spec.as_ref().map_or(name, |spec| &spec.id));
-                let (registry, options) = kind.ground.registry(id, &task_config.options)?;
+                let (registry, options) = kind.ground.registry(id, &task_config.options, kind.collides)?;
                 let options = VecEnvOptions { agents: BLOCK, autoreset: Autoreset::Disabled, options, ..default() };
                 let mut env = VecEnv::from_registry(&registry, id, &options)?;
                 let (n_obs, out) = (env.spec().obs, env.buffers());
@@ -114,6 +114,7 @@ impl CharacterBatch {
             let _ = env.set_ground(lane, 0, &own);
         }
         self.vary(lane, &Variation::none(&self.model.clone()));
+        self.feel(lane, &[]);
         if let Engine::Env(env) = self.engine.get() {
             // any agent can be given back to its schedule
             let _ = env.set_command(lane, None);
@@ -145,6 +146,18 @@ impl CharacterBatch {
             }
         }
         Ok(())
+    }
+
+    /// Sets what is around a ragdoll.
+    pub fn feel(&mut self, lane: usize, obstacles: &[Obstacle]) {
+        if self.model.obstacles.is_none() {
+            return;
+        }
+        match self.engine.get() {
+            // the lane exists, and the numbers are checked
+            Engine::Env(env) => drop(env.set_obstacles(lane, obstacles)),
+            Engine::Free(batch, _) => batch.set_obstacles(lane, obstacles),
+        }
     }
 
     /// Puts a ragdoll into a state.

@@ -47,6 +47,8 @@ pub(crate) struct CharacterKind {
     /// The task of an agent.
     pub task_config: TaskConfig,
     pub ground: Ground,
+    /// Whether its ragdolls touch more than their ground.
+    pub collides: bool,
     pub model: Arc<Model>,
     pub spec: Option<Arc<Spec>>,
     pub feet: Vec<Arc<str>>,
@@ -72,10 +74,10 @@ impl CharacterKind {
     pub fn of_agent(
         name: &str,
         task_config: &TaskConfig,
-        ground: Ground,
+        (ground, collides): (Ground, bool),
         time: Duration,
     ) -> Result<Self, RagdollError> {
-        let agent = ground.agent_with(&task_config.agent, &task_config.options)?;
+        let agent = ground.colliding_agent(&task_config.agent, &task_config.options, collides)?;
         let spec = agent.clone().shards(Isa::best())?.spec().clone();
         let model = Arc::new(agent.model()?);
         let feet: Vec<Arc<str>> = agent.facts().feet.iter().map(|n| Arc::from(n.as_str())).collect();
@@ -83,6 +85,7 @@ impl CharacterKind {
             character: Character::Agent(name.into()),
             task_config: task_config.clone(),
             ground,
+            collides,
             limbs: Arc::new(Limbs::of(&model, &feet)),
             model,
             feet,
@@ -99,13 +102,22 @@ impl CharacterKind {
     }
 
     /// The kind of a body, without ragdolls yet.
-    pub fn of_prefab(prefab: &Handle<RagdollPrefab>, model: Arc<Model>, time: Duration) -> Self {
+    pub fn of_prefab(
+        prefab: &Handle<RagdollPrefab>,
+        model: Arc<Model>,
+        collides: bool,
+        time: Duration,
+    ) -> Result<Self, RagdollError> {
+        if collides && model.obstacles.is_none() {
+            return Err(RagdollError::NoObstacles { model: model.name.clone() });
+        }
         let substeps = (PREFAB_DT / model.opt.timestep).round().max(1.0) as usize;
         let dt = substeps as f64 * model.opt.timestep;
-        CharacterKind {
+        Ok(CharacterKind {
             character: Character::Prefab(prefab.clone()),
             task_config: TaskConfig::default(),
             ground: Ground::Level,
+            collides,
             limbs: Arc::new(Limbs::of(&model, &[])),
             model,
             feet: Vec::new(),
@@ -118,7 +130,7 @@ impl CharacterKind {
             unpacked: false,
             entered: 0,
             identity: OnceLock::new(),
-        }
+        })
     }
 
     /// Gives a ragdoll a free lane.

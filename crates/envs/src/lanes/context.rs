@@ -2,9 +2,9 @@
 //!
 //! The group stores commands. The physics stores ground, variations and pushes, because its kernels read them.
 
-use marathon_physics::Variation;
 use marathon_physics::lanes::Real;
 use marathon_physics::model::HField;
+use marathon_physics::{Obstacle, Variation};
 
 use super::group::LaneGroup;
 use super::task::TaskData;
@@ -94,6 +94,24 @@ impl<T: Real> AgentContext for LaneContext<'_, T> {
             return refuse("elevations", x, "finite numbers");
         }
         self.group.physics.set_ground(&self.task.sim, self.lane, field, elevations);
+        Ok(())
+    }
+
+    fn obstacles(&self) -> Vec<Obstacle> {
+        self.group.physics.obstacles(self.lane)
+    }
+
+    fn set_obstacles(&mut self, obstacles: &[Obstacle]) -> Result<(), EnvError> {
+        if self.task.blueprint.model.obstacles.is_none() && !obstacles.is_empty() {
+            return refuse("obstacles", obstacles.len(), "none: the model has no geom for obstacles");
+        }
+        if obstacles.len() > Obstacle::MOST {
+            return refuse("obstacles", obstacles.len(), "no more than 256");
+        }
+        if let Some((name, found, expected)) = obstacles.iter().find_map(Obstacle::out_of_range) {
+            return refuse(name, found, expected);
+        }
+        self.group.physics.set_obstacles(&self.task.sim, self.lane, obstacles);
         Ok(())
     }
 }

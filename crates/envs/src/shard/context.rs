@@ -1,10 +1,10 @@
 //! Inputs of an agent besides its actions.
 
-use marathon_physics::Variation;
+use marathon_physics::{Obstacle, Variation};
 
 use crate::error::EnvError;
 
-/// Inputs of one agent: command, ground, constants and pushes. All of them are part of snapshots.
+/// Inputs of one agent: command, ground, obstacles, constants and pushes. All of them are part of snapshots.
 ///
 /// Get it from [`AgentShard::context`](crate::AgentShard::context).
 pub trait AgentContext {
@@ -41,4 +41,14 @@ pub trait AgentContext {
     /// # Errors
     /// If there is no such field, or the heights are not finite numbers for each point of its grid.
     fn set_ground(&mut self, field: usize, elevations: &[f32]) -> Result<(), EnvError>;
+    /// The agent's obstacles, where they are now.
+    fn obstacles(&self) -> Vec<Obstacle>;
+    /// Sets the agent's obstacles: solids that it touches and cannot move. They keep their velocities until they are set
+    /// again, also across resets. Starts that need physics are computed without them.
+    ///
+    /// # Errors
+    /// If the model has no geom for obstacles
+    /// ([`ModelSpec::add_obstacles`](marathon_physics::spec::ModelSpec::add_obstacles)), there are too many, or a number is
+    /// out of its range.
+    fn set_obstacles(&mut self, obstacles: &[Obstacle]) -> Result<(), EnvError>;
 }

@@ -4,8 +4,8 @@
 //! distributed over the threads of a pool. Results do not depend on the number of threads, the number of agents or the
 //! instruction set.
 
-use marathon_physics::Variation;
 use marathon_physics::lanes::Isa;
+use marathon_physics::{Obstacle, Variation};
 use rayon::prelude::*;
 
 use super::arrays::{ObsNumber, Step, StepMut, to_rows};
@@ -184,6 +184,14 @@ impl VecEnv {
     /// If there is no such agent or field, or the heights are not finite numbers for each point of the field's grid.
     pub fn set_ground(&mut self, agent: usize, field: usize, elevations: &[f32]) -> Result<(), EnvError> {
         self.context(agent)?.set_ground(field, elevations)
+    }
+
+    /// Sets an agent's obstacles, see [`AgentContext::set_obstacles`].
+    ///
+    /// # Errors
+    /// If there is no such agent, its model has no geom for obstacles, there are too many, or a number is out of its range.
+    pub fn set_obstacles(&mut self, agent: usize, obstacles: &[Obstacle]) -> Result<(), EnvError> {
+        self.context(agent)?.set_obstacles(obstacles)
     }
 
     /// Writes the observations of the agents in `mask` at their present states, as at the start of an episode. Use it

@@ -26,6 +26,7 @@ mod video;
 pub use audio::{PlaySound, RATE, Sound};
 pub use cli::Args;
 pub use error::GameError;
+pub use features::boxes::Pile;
 pub use features::course::leaderboard::{Course, KEPT, Place, ROWS, Run, Table};
 pub use features::course::{List, MOST_STEPS, Runs, Site, Step};
 pub use features::drag::Dragged;

@@ -6,7 +6,7 @@ use super::quantity::{Felt, Quantity};
 use crate::lanes::Real;
 use crate::readings::Readings;
 use crate::sim::Sim;
-use crate::state::{AgentState, Group, SolverStats, Variation, Work};
+use crate::state::{AgentState, Group, Obstacle, SolverStats, Variation, Work};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -27,6 +27,8 @@ pub(super) trait Lanes: Send {
     fn vary(&mut self, agent: usize, variation: &Variation);
     fn ground(&self, agent: usize, field: usize) -> Vec<f32>;
     fn set_ground(&mut self, agent: usize, field: usize, elevations: &[f32]);
+    fn obstacles(&self, agent: usize) -> Vec<Obstacle>;
+    fn set_obstacles(&mut self, agent: usize, obstacles: &[Obstacle]);
     /// Stores the current states. Keeps the newest `depth` of them.
     fn remember(&mut self, depth: usize);
     /// The stored states of an agent, oldest first.
@@ -173,6 +175,16 @@ impl<T: Real> Lanes for LaneBatch<T> {
     fn set_ground(&mut self, agent: usize, field: usize, elevations: &[f32]) {
         let (g, lane) = Self::slot(agent);
         self.groups[g].set_ground(&self.sim, lane, field, elevations);
+    }
+
+    fn obstacles(&self, agent: usize) -> Vec<Obstacle> {
+        let (g, lane) = Self::slot(agent);
+        self.groups[g].obstacles(lane)
+    }
+
+    fn set_obstacles(&mut self, agent: usize, obstacles: &[Obstacle]) {
+        let (g, lane) = Self::slot(agent);
+        self.groups[g].set_obstacles(&self.sim, lane, obstacles);
     }
 
     fn remember(&mut self, depth: usize) {

@@ -17,7 +17,7 @@ pub use quantity::Quantity;
 use crate::lanes::Isa;
 use crate::model::Model;
 use crate::sim::{Sim, SimError, SimOptions};
-use crate::state::{AgentState, SolverStats, Variation};
+use crate::state::{AgentState, Obstacle, SolverStats, Variation};
 use crate::with_lanes;
 use lanes::{LaneBatch, Lanes};
 use std::sync::Arc;
@@ -246,6 +246,27 @@ impl Batch {
     pub fn set_ground(&mut self, agent: usize, field: usize, elevations: &[f32]) {
         assert!(agent < self.agents, "agent {agent} of {}", self.agents);
         self.inner.set_ground(agent, field, elevations);
+    }
+
+    /// An agent's obstacles, where they are now.
+    ///
+    /// # Panics
+    /// If the agent does not exist.
+    pub fn obstacles(&self, agent: usize) -> Vec<Obstacle> {
+        assert!(agent < self.agents, "agent {agent} of {}", self.agents);
+        self.inner.obstacles(agent)
+    }
+
+    /// Sets an agent's obstacles: solids that it touches and cannot move. They keep their velocities until they are set
+    /// again, and survive a reset.
+    ///
+    /// # Panics
+    /// If the agent does not exist, the model has no
+    /// [geom for obstacles](crate::spec::ModelSpec::add_obstacles), there are more than [`Obstacle::MOST`], or a number is
+    /// [out of its range](Obstacle::out_of_range).
+    pub fn set_obstacles(&mut self, agent: usize, obstacles: &[Obstacle]) {
+        assert!(agent < self.agents, "agent {agent} of {}", self.agents);
+        self.inner.set_obstacles(agent, obstacles);
     }
 
     /// Counts of the constraint solver's work.

@@ -31,6 +31,8 @@ fn surround<T: Real>(sim: &Sim<T>, work: &Work<T>, broad: &Broad<T::Scalar>, geo
     let axis = &work.contacts.directions[geom];
     let mut half = [T::zero(); 3];
     match model.kind {
+        // an agent's obstacles can be anywhere
+        _ if sim.model.obstacles == Some(geom) => half = [T::lit(f64::INFINITY); 3],
         GeomType::Sphere => half = [size[0]; 3],
         GeomType::Capsule | GeomType::Cylinder => {
             for i in 0..3 {

@@ -2,6 +2,7 @@
 
 use super::candidate::{Candidate, add_all, gather};
 use super::slots::Slots;
+use crate::algebra::spatial::V3;
 use crate::geometry::convex::{Form, Number, Polyhedron, Solid, convex, field_convex, plane_hull};
 use crate::geometry::{Plane, first_tangent, pick, pick_axes};
 use crate::lanes::kernel_fn;
@@ -32,7 +33,7 @@ kernel_fn! {
             }
             let [a, b] = [pick(&candidate.centers[0], lane), pick(&candidate.centers[1], lane)];
             let [turned_a, turned_b] = [pick_axes(&axes[0], lane), pick_axes(&axes[1], lane)];
-            let second = Solid { center: b, axes: turned_b, form: form(pair, 1, &sim.hulls) };
+            let second = Solid { center: b, axes: turned_b, form: form_of(pair, 1, &sim.hulls) };
             own.clear();
             match pair.shapes {
                 ShapePair::PlaneHull => {
@@ -44,7 +45,7 @@ kernel_fn! {
                     field_convex((field, &a, &turned_a), &second, pair.margin, &sim.search, scratch, own);
                 }
                 _ => {
-                    let first = Solid { center: a, axes: turned_a, form: form(pair, 0, &sim.hulls) };
+                    let first = Solid { center: a, axes: turned_a, form: form_of(pair, 0, &sim.hulls) };
                     convex(&first, &second, pair.margin, &sim.search, scratch, own);
                 }
             }
@@ -59,15 +60,20 @@ kernel_fn! {
 }
 
 /// The shape of one of a pair's geoms.
-fn form<'a, S: Number>(pair: &PairSpec<S>, which: usize, hulls: &'a [Polyhedron<S>]) -> Form<'a, S> {
-    let [x, y, z] = pair.sizes[which];
-    match pair.kinds[which] {
+fn form_of<'a, S: Number>(pair: &PairSpec<S>, which: usize, hulls: &'a [Polyhedron<S>]) -> Form<'a, S> {
+    form(pair.kinds[which], &pair.sizes[which], hulls.get(pair.hulls[which]))
+}
+
+/// The shape of a geom of a kind and size, for meshes with its hull.
+pub(super) fn form<'a, S: Number>(kind: GeomType, size: &V3<S>, hull: Option<&'a Polyhedron<S>>) -> Form<'a, S> {
+    let [x, y, z] = *size;
+    match kind {
         GeomType::Capsule => Form::Capsule { radius: x, half: y },
         GeomType::Ellipsoid => Form::Ellipsoid { half: [x, y, z] },
         GeomType::Cylinder => Form::Cylinder { radius: x, half: y },
         GeomType::Box => Form::Cuboid { half: [x, y, z] },
-        GeomType::Mesh => Form::Hull(&hulls[pair.hulls[which]]),
+        GeomType::Mesh if let Some(hull) = hull => Form::Hull(hull),
         // planes and height fields have no form of their own
-        GeomType::Sphere | GeomType::Plane | GeomType::Hfield => Form::Sphere { radius: x },
+        _ => Form::Sphere { radius: x },
     }
 }

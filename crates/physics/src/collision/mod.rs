@@ -9,6 +9,7 @@ mod candidate;
 mod convex;
 mod floor;
 mod narrow_phase;
+mod obstacles;
 mod slots;
 
 pub(crate) use adhesion::adhere;

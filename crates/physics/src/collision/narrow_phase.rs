@@ -6,6 +6,7 @@
 use super::broad;
 use super::candidate::{Candidate, add_all, gather};
 use super::convex::touch_convex;
+use super::obstacles::touch_obstacles;
 use super::slots::{Place, Slots};
 use crate::algebra::spatial::*;
 use crate::geometry::height::{Terrain, field_box};
@@ -98,6 +99,12 @@ fn near<T: Real>(
     match pair.cull {
         Cull::Balls => geometry::near(&point, &centers[1], reach),
         Cull::Plane => plane::near_plane(&Plane { point, normal }, &centers[1], reach),
+        Cull::Obstacles => match (&group.obstacles, pair.links[1]) {
+            (Some(obstacles), Some(link)) => {
+                obstacles.any_near(&work.motion.reference[sim.links[link].tree], &centers[1], reach)
+            }
+            _ => T::none(),
+        },
         Cull::Field => {
             let top = group.ground_top(sim, pair.field);
             for i in 0..3 {
@@ -170,6 +177,10 @@ fn touch_pair<T: Real>(
         }
         ShapePair::PlaneHull | ShapePair::Convex | ShapePair::FieldConvex => {
             touch_convex(sim, group, work, slots, candidate);
+            return None;
+        }
+        ShapePair::Obstacles => {
+            touch_obstacles(sim, group, work, slots, candidate);
             return None;
         }
         ShapePair::CapsuleBox | ShapePair::BoxBox | ShapePair::FieldBox => {

@@ -5,7 +5,7 @@ use crate::algebra::spatial::*;
 use crate::geometry::Touch;
 use crate::lanes::{Real, kernel_fn};
 use crate::rows::{Block, Jacobian, Source};
-use crate::sim::{Cost, GeomPairOf, PairSpec, Sim, impedance};
+use crate::sim::{Cost, GeomPairOf, PairSpec, ShapePair, Sim, impedance};
 use crate::state::{Group, Work};
 
 /// The slots of the current class of pairs: the first one, and how many of them each lane has filled.
@@ -13,11 +13,23 @@ pub(super) struct Slots<T: Real> {
     class: (bool, usize),
     first: usize,
     filled: T,
+    /// The static geom under the coming contacts, if it moves.
+    pub(super) carrier: Option<Carrier<T>>,
+}
+
+/// The motion of a geom that no joint moves.
+#[derive(Clone, Copy)]
+pub(super) struct Carrier<T: Real> {
+    /// Relative to the reference point of the contacts' positions.
+    pub center: V3<T>,
+    /// Of its center.
+    pub velocity: V3<T>,
+    pub spin: V3<T>,
 }
 
 impl<T: Real> Slots<T> {
     pub(super) fn new() -> Self {
-        Slots { class: (false, 0), first: 0, filled: T::zero() }
+        Slots { class: (false, 0), first: 0, filled: T::zero(), carrier: None }
     }
 
     /// A slot, with its number in its class, such that no lane of `lanes` has a free slot before it. `blocks` slots
@@ -38,7 +50,7 @@ impl<T: Real> Slots<T> {
     #[inline(always)]
     pub(super) fn turn_to(&mut self, class: (bool, usize), next: usize) {
         if class != self.class {
-            *self = Slots { class, first: next, filled: T::zero() };
+            *self = Slots { class, first: next, filled: T::zero(), carrier: None };
         }
     }
 }
@@ -75,7 +87,7 @@ kernel_fn! {
         let pair = &sim.contacts.pair(&sim.geoms, place.index);
         let one = T::lit(1.0);
         work.stats.contacts += T::bits(touch.on).count_ones() as u64;
-        report(pair, work, touch.on);
+        report(pair, work, touch);
         let mut links = pair.links;
         let t2 = cross(&touch.normal, &touch.tangent);
         let mut frame = [touch.normal, touch.tangent, t2];
@@ -84,7 +96,7 @@ kernel_fn! {
             links.swap(0, 1);
             frame = [neg3(&frame[0]), neg3(&frame[1]), neg3(&frame[2])];
         }
-        let rows = rows(sim, group, work, place, touch, &links, frame);
+        let rows = rows(sim, group, work, (place, slots.carrier), touch, &links, frame);
 
         // every lane's next free slot
         let mut left = touch.on;
@@ -113,13 +125,13 @@ kernel_fn! {
     }
 }
 
-/// Rows of a contact in the frame `frame`. At least its second side moves.
+/// Rows of a contact in the frame `frame`. Joints move at least its second side.
 #[inline(always)]
 fn rows<T: Real>(
     sim: &Sim<T>,
     group: &Group<T>,
     work: &Work<T>,
-    place: Place,
+    (place, carrier): (Place, Option<Carrier<T>>),
     touch: &Touch<T>,
     links: &[Option<usize>; 2],
     frame: [V3<T>; 3],
@@ -138,6 +150,10 @@ fn rows<T: Real>(
         let v = &work.motion.vel[l];
         velocity[s] = cross_add(&ang(v), &points[s], &lin(v));
         spin[s] = ang(v);
+    }
+    if let Some(Carrier { center, velocity: own, spin: turn }) = carrier {
+        velocity[0] = cross_add(&turn, &sub3(&touch.pos, &center), &own);
+        spin[0] = turn;
     }
     let v = sub3(&velocity[1], &velocity[0]);
     let w = sub3(&spin[1], &spin[0]);
@@ -168,10 +184,19 @@ pub(super) fn pyramid_share<T: Real>(mu0: T, factor: T) -> T {
     (one + square).div((factor * factor) * (one + varied))
 }
 
-/// Marks the touching geoms.
+/// Vertical component of the normal from which an obstacle carries what touches it: 45 degrees.
+const CARRIES: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
+/// Marks the touching geoms. An obstacle counts as ground where it carries the geom, else as another body.
 #[inline(always)]
-fn report<T: Real>(pair: &GeomPairOf<T::Scalar>, work: &mut Work<T>, on: T::Mask) {
-    if pair.coupled {
+fn report<T: Real>(pair: &GeomPairOf<T::Scalar>, work: &mut Work<T>, touch: &Touch<T>) {
+    let on = touch.on;
+    if pair.shapes == ShapePair::Obstacles {
+        let carried = T::and(on, T::lit(CARRIES).lt(touch.normal[2]));
+        work.contacts.touch_ground(pair.moving(), carried);
+        let beside = &mut work.contacts.touching_bodies[pair.moving()];
+        *beside = T::or(*beside, T::and(on, T::not(carried)));
+    } else if pair.coupled {
         for g in pair.geoms {
             work.contacts.touching_bodies[g] = T::or(work.contacts.touching_bodies[g], on);
         }

@@ -87,9 +87,13 @@ impl<S: Real> Touches<S> {
     fn is_full(&self) -> bool {
         self.items.len() == CAPACITY
     }
+    /// Changes every contact.
+    pub(crate) fn each(&mut self, change: impl FnMut(&mut Touch<S>)) {
+        self.items.iter_mut().for_each(change);
+    }
     /// Adds a contact if it exists and the list is not full.
     #[inline(always)]
-    fn push(&mut self, touch: Touch<S>) {
+    pub(crate) fn push(&mut self, touch: Touch<S>) {
         if S::any(touch.on) && !self.is_full() {
             self.items.push(touch);
         }

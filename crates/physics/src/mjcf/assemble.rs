@@ -59,6 +59,7 @@ pub(crate) fn compile(root: &Element, file: &ReadFile, room: &Room) -> Result<Mo
         pairs: Vec::new(),
         excludes: Vec::new(),
         numerics: custom::numerics(root, room)?,
+        obstacles: None,
         qpos0: Vec::new(),
         qpos_spring: Vec::new(),
         stat: Statistics { mean_inertia: 1.0, mean_mass: 1.0, extent: 2.0, center: [0.0; 3] },
@@ -77,6 +78,7 @@ pub(crate) fn compile(root: &Element, file: &ReadFile, room: &Room) -> Result<Mo
     model.tendons = tendon::compile(root, &defaults, &names, &settings, &model, room)?;
     model.pairs = contact::pairs(root, &defaults, &names, &model.geoms)?;
     model.excludes = contact::excludes(root, &names)?;
+    model.obstacles = custom::obstacles(root, &names, &model.geoms)?;
     mesh::add(&mut model, &assets.meshes, room)?;
     actuator::compile(root, &defaults, &names, &settings, &mut model, room)?;
     model.sensors = sensor::compile(root, &names, &model, room)?;

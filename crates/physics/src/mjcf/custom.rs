@@ -1,13 +1,13 @@
-//! `<custom>` numbers and `<keyframe>` states.
+//! `<custom>` numbers, the geom of the obstacles, and `<keyframe>` states.
 
 use super::document::Element;
 use super::error::MjcfError;
 use super::math::{EPS, IDENTITY, quat_norm};
-use super::names::Names;
+use super::names::{Names, Registry};
 use super::room::Room;
 use super::settings::{entries, sections};
 use super::value::{Attrs, numbers};
-use crate::model::{JointType, Keyframe, Model, Quat};
+use crate::model::{Geom, GeomType, JointType, Keyframe, Model, Quat};
 
 /// More keyframes or numbers than this are a mistake in the file.
 const LARGEST: usize = 100_000;
@@ -39,6 +39,24 @@ pub(crate) fn numerics(root: &Element, room: &Room) -> Result<Vec<(String, Vec<f
             Ok((name.to_owned(), data))
         })
         .collect()
+}
+
+/// Name of the `<text>` that names the geom of the obstacles.
+pub(super) const OBSTACLES: &str = "marathon_obstacles";
+
+/// The geom that stands for the obstacles of an agent: the one that `<custom><text name="marathon_obstacles">` names.
+pub(crate) fn obstacles(root: &Element, names: &Registry, geoms: &[Geom]) -> Result<Option<usize>, MjcfError> {
+    let mut texts = entries(root, "custom").filter(|e| e.name == "text" && e.text("name") == Some(OBSTACLES));
+    let Some(element) = texts.next() else { return Ok(None) };
+    if let Some(second) = texts.next() {
+        return Err(second.invalid("there is already a text of this name"));
+    }
+    let geom = names.geoms.required(element, "data")?;
+    if geoms[geom].body != 0 || geoms[geom].kind != GeomType::Sphere {
+        let found = format!("'{}' is no sphere of the world", geoms[geom].name);
+        return Err(element.invalid(format!("{found}; the geom that stands for obstacles must be one")));
+    }
+    Ok(Some(geom))
 }
 
 /// `<keyframe>`: what a key leaves out is the reference configuration at rest.

@@ -78,6 +78,8 @@ pub struct Model {
     pub excludes: Vec<[usize; 2]>,
     /// Custom numbers (`<custom><numeric>`), by name, in document order.
     pub numerics: Vec<(String, Vec<f64>)>,
+    /// The geom of the world that stands for an agent's [obstacles](crate::Obstacle), if agents touch them.
+    pub obstacles: Option<usize>,
     /// Reference configuration, length `nq`.
     pub qpos0: Vec<f64>,
     /// Configuration in which the joint springs are at rest, length `nq`.

@@ -116,6 +116,7 @@ pub(super) fn contacts<T: Real>(
             }
             // in the order of MuJoCo's shape types
             let (a, b) = if rank(model.geoms[i].kind) <= rank(model.geoms[j].kind) { (i, j) } else { (j, i) };
+            let (a, b) = if model.obstacles == Some(b) { (b, a) } else { (a, b) };
             let geoms = [a as u32, b as u32];
             out.check().map_err(|over| SimError::Budget { model: model.name.clone(), over })?;
             if let (None, Some(spec)) = (declared, known.get(&[kinds[a], kinds[b]])) {
@@ -198,7 +199,7 @@ fn kinds(model: &Model, mounts: &[BodyMount], link: impl Fn(usize) -> Option<usi
 }
 
 /// Rank in MuJoCo's order of shape types.
-fn rank(kind: GeomType) -> usize {
+pub(crate) fn rank(kind: GeomType) -> usize {
     match kind {
         GeomType::Plane => 0,
         GeomType::Hfield => 1,

@@ -33,7 +33,7 @@ pub(crate) use actuator::{Activation, ActuatorSpec, TendonForceRange, Transmissi
 pub(crate) use adhesion::AdhesionSpec;
 pub(crate) use broad::Broad;
 pub(crate) use caps::Caps;
-pub(crate) use contacts::Contacts;
+pub(crate) use contacts::{Contacts, rank};
 pub(crate) use drive::{DriveKind, DriveSpec};
 pub(crate) use equality::{EqualitySpec, Frames, Length, Tie};
 pub(crate) use limit::{BallLimit, DryFriction, LimitSpec};

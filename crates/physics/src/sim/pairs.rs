@@ -30,10 +30,12 @@ pub(crate) enum ShapePair {
     PlaneHull,
     Convex,
     FieldConvex,
+    /// An agent's obstacles, and a geom.
+    Obstacles,
 }
 
 impl ShapePair {
-    fn of(a: GeomType, b: GeomType) -> Option<ShapePair> {
+    pub(crate) fn of(a: GeomType, b: GeomType) -> Option<ShapePair> {
         use GeomType as G;
         Some(match (a, b) {
             (G::Plane, G::Sphere) => ShapePair::PlaneSphere,
@@ -75,6 +77,8 @@ pub(crate) enum Cull {
     Plane,
     /// The first is a height field: nothing touches it above its highest point.
     Field,
+    /// Balls around the second and each of the agent's obstacles.
+    Obstacles,
 }
 
 /// Two geoms that may touch. There can be millions of these.
@@ -171,7 +175,11 @@ pub(super) fn add<T: Real>(
 ) -> bool {
     let c = T::scalar;
     let [a, b] = geoms.map(|g| &model.geoms[g]);
-    let Some(shapes) = ShapePair::of(a.kind, b.kind) else { return false };
+    let Some(mut shapes) = ShapePair::of(a.kind, b.kind) else { return false };
+    let obstacles = model.obstacles == Some(geoms[0]);
+    if obstacles {
+        shapes = ShapePair::Obstacles;
+    }
     // a mesh without a hull does not collide
     if [a, b].iter().any(|g| g.kind == GeomType::Mesh && g.hull.is_none()) {
         return false;
@@ -198,6 +206,7 @@ pub(super) fn add<T: Real>(
     let cull = match a.kind {
         GeomType::Plane => Cull::Plane,
         GeomType::Hfield => Cull::Field,
+        _ if obstacles => Cull::Obstacles,
         _ => Cull::Balls,
     };
     let radius = |g: &Geom| match g.hull {

@@ -1,6 +1,7 @@
 //! The complete state of one agent, independent of lanes.
 
 use super::group::Group;
+use super::obstacle::Obstacle;
 use super::variation::Variation;
 use crate::geometry::height::HeightField;
 use crate::lanes::Real;
@@ -22,6 +23,8 @@ pub struct AgentState {
     variation: Option<Variation>,
     /// The agent's own elevations, m, by height field.
     grounds: Vec<Option<Vec<f32>>>,
+    /// The agent's obstacles.
+    obstacles: Vec<Obstacle>,
 }
 
 impl AgentState {
@@ -38,12 +41,19 @@ impl AgentState {
             && (self.pushes.is_empty() || self.pushes.len() == 6 * bodies.len())
             && self.variation.as_ref().is_none_or(varied)
             && self.grounds.iter().enumerate().all(grid)
+            && (self.obstacles.is_empty() || model.obstacles.is_some() && self.obstacles.len() <= Obstacle::MOST)
+            && self.obstacles.iter().all(|o| o.out_of_range().is_none())
     }
 
     /// Appends the state's bytes. [`read_from`](AgentState::read_from) is the inverse.
     pub fn write_to(&self, bytes: &mut Vec<u8>) {
-        let AgentState { numbers, pushes, variation, grounds } = self;
-        let own = [(PUSHED, !pushes.is_empty()), (VARIED, variation.is_some()), (GROUNDED, !grounds.is_empty())];
+        let AgentState { numbers, pushes, variation, grounds, obstacles } = self;
+        let own = [
+            (PUSHED, !pushes.is_empty()),
+            (VARIED, variation.is_some()),
+            (GROUNDED, !grounds.is_empty()),
+            (OBSTRUCTED, !obstacles.is_empty()),
+        ];
         bytes.push(own.iter().map(|(bit, there)| bit * u8::from(*there)).sum());
         let varied =
             variation.iter().flat_map(|v| v.mass.iter().chain([&v.friction]).chain(&v.strength).chain(&v.gravity));
@@ -54,6 +64,10 @@ impl AgentState {
             bytes.push(u8::from(ground.is_some()));
             bytes.extend(ground.iter().flatten().flat_map(|x| x.to_le_bytes()));
         }
+        if !obstacles.is_empty() {
+            bytes.extend((obstacles.len() as u32).to_le_bytes());
+            bytes.extend(obstacles.iter().flat_map(Obstacle::numbers).flat_map(f64::to_le_bytes));
+        }
     }
 
     /// Reads the state of an agent of this model from bytes of [`write_to`](AgentState::write_to). Returns it with the
@@ -61,7 +75,7 @@ impl AgentState {
     pub fn read_from<'a>(model: &Model, bytes: &'a [u8]) -> Option<(Self, &'a [u8])> {
         let Model { nq, nv, nu, na, bodies, hfields, .. } = model;
         let (own, mut bytes) = bytes.split_first()?;
-        if own & !(PUSHED | VARIED | GROUNDED) != 0 {
+        if own & !(PUSHED | VARIED | GROUNDED | OBSTRUCTED) != 0 {
             return None;
         }
         let numbers = take(&mut bytes, nq + 2 * nv + nu + na, f64::from_le_bytes)?;
@@ -85,7 +99,16 @@ impl AgentState {
                 _ => return None,
             });
         }
-        Some((AgentState { numbers, pushes, variation, grounds }, bytes))
+        let mut obstacles = Vec::new();
+        if own & OBSTRUCTED != 0 {
+            let count = take(&mut bytes, 1, u32::from_le_bytes)?[0] as usize;
+            if count > Obstacle::MOST || model.obstacles.is_none() {
+                return None;
+            }
+            let numbers = take(&mut bytes, 17 * count, f64::from_le_bytes)?;
+            obstacles = numbers.as_chunks().0.iter().map(Obstacle::of_numbers).collect::<Option<_>>()?;
+        }
+        Some((AgentState { numbers, pushes, variation, grounds, obstacles }, bytes))
     }
 }
 
@@ -93,6 +116,7 @@ impl AgentState {
 const PUSHED: u8 = 1;
 const VARIED: u8 = 2;
 const GROUNDED: u8 = 4;
+const OBSTRUCTED: u8 = 8;
 
 /// Takes `count` numbers from the front of some bytes.
 fn take<const N: usize, X>(bytes: &mut &[u8], count: usize, number: fn([u8; N]) -> X) -> Option<Vec<X>> {
@@ -110,6 +134,7 @@ impl PartialEq for AgentState {
             && same(&self.pushes, &other.pushes)
             && self.variation == other.variation
             && self.grounds == other.grounds
+            && self.obstacles == other.obstacles
     }
 }
 
@@ -142,6 +167,7 @@ impl<T: Real> Group<T> {
             pushes,
             variation: self.varied.as_ref().and_then(|_| self.deviation(sim, lane)),
             grounds,
+            obstacles: self.obstacles(lane),
         }
     }
 
@@ -180,6 +206,7 @@ impl<T: Real> Group<T> {
             None if self.varied.is_some() => self.vary(sim, lane, &Variation::none(&sim.model)),
             None => {}
         }
+        self.put_obstacles(lane, &state.obstacles);
         for field in 0..sim.fields.len() {
             match state.grounds.get(field) {
                 Some(Some(elevations)) => self.set_ground(sim, lane, field, elevations),

@@ -1,5 +1,6 @@
 //! State of a lane group.
 
+use super::solids::Solids;
 use crate::algebra::spatial::{V3, V6};
 use crate::geometry::height::HeightField;
 use crate::lanes::Real;
@@ -29,6 +30,8 @@ pub struct Group<T: Real> {
     pub(crate) varied: Option<Box<Varied<T>>>,
     /// Height fields that differ from the model's, by field and lane; empty for none.
     pub(crate) grounds: Vec<Option<Arc<HeightField<T::Scalar>>>>,
+    /// Obstacles of agents that have some.
+    pub(crate) obstacles: Option<Box<Solids<T>>>,
 }
 
 /// An agent's own constants in place of the model's.
@@ -55,6 +58,7 @@ impl<T: Real> Group<T> {
             xfrc_applied: Vec::new(),
             varied: None,
             grounds: Vec::new(),
+            obstacles: None,
             qacc_warmstart: vec![zero; m.nv],
         }
     }

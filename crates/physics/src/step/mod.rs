@@ -38,6 +38,7 @@ impl<T: Real> Sim<T> {
                 self.forward_again(work, group);
                 self.finish_step(work, group);
             }
+            group.move_obstacles(self.dt);
         }
     }
 

@@ -1,5 +1,6 @@
 //! The features of the modes. They exchange messages, and none imports another.
 
+pub mod boxes;
 pub mod course;
 pub mod drag;
 pub mod film;
@@ -16,6 +17,7 @@ use bevy::prelude::*;
 
 pub(super) fn plugin(app: &mut App) {
     app.insert_resource(key_hints()).add_plugins((
+        boxes::plugin,
         course::plugin,
         drag::plugin,
         film::plugin,

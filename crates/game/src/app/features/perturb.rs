@@ -97,6 +97,7 @@ pub(super) fn key_hints(hints: &mut KeyHints) {
             Action::Menu,
             Action::Push,
             Action::Throw,
+            Action::Boxes,
             Action::Limp,
             Action::Slower,
             Action::Film,

@@ -28,6 +28,8 @@ pub enum Action {
     Push,
     /// Throw a ball at the character in focus.
     Throw,
+    /// Put a pile of boxes in front of the character in focus.
+    Boxes,
     /// Take the strength of the character in focus away, or give it back.
     Limp,
     /// Keep the last ten seconds as a film.

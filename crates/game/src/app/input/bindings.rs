@@ -49,7 +49,7 @@ const fn steer(steer: Steer, name: &'static str, key: KeyCode, button: Option<Ga
     Row { what: Bindable::Steer(steer), name, key, button }
 }
 
-const DEFAULTS: [Row; 42] = [
+const DEFAULTS: [Row; 43] = [
     steer(Steer::MoveAhead, "move ahead", KeyCode::KeyW, None),
     steer(Steer::MoveBack, "move back", KeyCode::KeyS, None),
     steer(Steer::MoveLeft, "move left", KeyCode::KeyA, None),
@@ -72,6 +72,7 @@ const DEFAULTS: [Row; 42] = [
     act(Action::Camera, "camera", KeyCode::KeyC, Some(GamepadButton::LeftTrigger)),
     act(Action::Push, "push", KeyCode::KeyP, Some(GamepadButton::South)),
     act(Action::Throw, "throw a ball", KeyCode::KeyB, Some(GamepadButton::RightTrigger2)),
+    act(Action::Boxes, "boxes", KeyCode::KeyO, None),
     act(Action::Limp, "limp", KeyCode::KeyZ, None),
     act(Action::Film, "film of the last 10 s", KeyCode::F9, None),
     act(Action::Contacts, "contacts", KeyCode::KeyF, None),

@@ -10,7 +10,8 @@ use crate::app::stage::scenario::{LoadScenario, PolicySource, Scenario};
 use bevy::prelude::*;
 use bevy_marathon::look::{FollowCamera, Marks, Tint};
 use bevy_marathon::{
-    AgentCommand, CharacterPolicy, Ground, Held, LaidGround, Opponent, PolicyAsset, Ragdoll, RagdollPrefab, Restart,
+    AgentCommand, CharacterPolicy, Collides, Ground, Held, LaidGround, Opponent, PolicyAsset, Ragdoll, RagdollPrefab,
+    Restart,
 };
 use marathon_envs::registry;
 use marathon_physics::Model;
@@ -74,6 +75,8 @@ pub fn spawn(
     let (spacing, radius) = (scene.spacing() as f32, scene.radius() as f32);
     let level = loaded.ground == Ground::Level && cast.model.hfields.is_empty();
     let after_fall = if scenario.mode == Mode::Learn { 0.0 } else { LIE };
+    // runs on courses are compared, and clips are followed, by one character alone
+    let collide = matches!(scenario.mode, Mode::Watch | Mode::Push);
     for i in 0..if scenario.mode == Mode::Testbed { 1 } else { scenario.agents } {
         let mut actor = commands.spawn((
             Actor(i),
@@ -83,6 +86,9 @@ pub fn spawn(
             Transform::from_translation(place(i, spacing, level)),
             Marks::default(),
         ));
+        if collide {
+            actor.insert(Collides::ALL);
+        }
         if i > 0 {
             actor.insert(Tint::of_row(i));
         }

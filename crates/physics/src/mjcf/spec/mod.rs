@@ -37,6 +37,7 @@ mod element;
 mod keyframes;
 mod kind;
 mod model_parts;
+mod obstacles;
 mod part;
 mod references;
 mod replicate;
