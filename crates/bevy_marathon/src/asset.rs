@@ -4,6 +4,7 @@ use bevy::asset::{AssetLoader, AsyncReadExt, LoadContext, io::Reader};
 use bevy::prelude::*;
 use bevy::reflect::TypePath;
 use marathon_learn::Policy;
+use marathon_motion::{Clip, MotionError};
 use marathon_physics::Model;
 use marathon_physics::budget::{self, Limit};
 use marathon_physics::mjcf::MjcfError;
@@ -36,6 +37,16 @@ impl From<Policy> for PolicyAsset {
     }
 }
 
+/// A motion clip. Loaded from `.motion` files, as `marathon motion import` writes them.
+#[derive(Asset, TypePath, Clone, Debug)]
+pub struct MotionClip(pub Arc<Clip>);
+
+impl From<Clip> for MotionClip {
+    fn from(clip: Clip) -> Self {
+        MotionClip(Arc::new(clip))
+    }
+}
+
 /// Why an asset cannot be used.
 #[derive(Debug, Error)]
 pub enum AssetError {
@@ -48,6 +59,9 @@ pub enum AssetError {
     /// It is no model.
     #[error(transparent)]
     Model(#[from] MjcfError),
+    /// It is no motion clip.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
     /// It is no policy.
     #[error(transparent)]
     Policy(#[from] marathon_learn::Error),
@@ -140,5 +154,29 @@ impl AssetLoader for PolicyLoader {
 
     fn extensions(&self) -> &[&str] {
         &["safetensors"]
+    }
+}
+
+/// Loads [`MotionClip`]s.
+#[derive(Default, TypePath)]
+pub struct MotionLoader;
+
+impl AssetLoader for MotionLoader {
+    type Asset = MotionClip;
+    type Settings = ();
+    type Error = AssetError;
+
+    async fn load(
+        &self,
+        reader: &mut dyn Reader,
+        _: &(),
+        context: &mut LoadContext<'_>,
+    ) -> Result<MotionClip, AssetError> {
+        let bytes = read(reader, &budget::CLIP_FILE).await?;
+        Ok(Clip::parse(context.path().path(), &bytes)?.into())
+    }
+
+    fn extensions(&self) -> &[&str] {
+        &["motion"]
     }
 }

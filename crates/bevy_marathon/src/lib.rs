@@ -49,6 +49,7 @@
 //! None is a default: then nothing draws and no renderer is compiled, as a server needs it.
 
 mod actuation;
+mod animation;
 pub mod asset;
 pub mod axes;
 mod characters;
@@ -76,7 +77,8 @@ mod simulate;
 mod snapshot;
 mod strength;
 
-pub use asset::{PolicyAsset, RagdollPrefab};
+pub use animation::PlayClip;
+pub use asset::{MotionClip, PolicyAsset, RagdollPrefab};
 pub use characters::{PoseSample, spec_of_role};
 pub use command::AgentCommand;
 pub use direction::MoveDirection;
@@ -106,8 +108,8 @@ pub mod prelude {
     pub use crate::ragdoll::*;
     pub use crate::{
         AgentCommand, CharacterPose, Collides, CommandError, Ground, HitReactions, LimbStrength, Lod, LodByDistance,
-        Marathon, MarathonSnapshot, MoveDirection, Obstacle, PolicyAsset, RagdollError, RagdollMode, RagdollPrefab,
-        RagdollSnapshot, RagdollState, SnapshotError, StrengthError,
+        Marathon, MarathonSnapshot, MotionClip, MoveDirection, Obstacle, PlayClip, PolicyAsset, RagdollError,
+        RagdollMode, RagdollPrefab, RagdollSnapshot, RagdollState, SnapshotError, StrengthError,
     };
     pub use marathon_physics::Variation;
     pub use marathon_runs::TaskConfig;

@@ -19,4 +19,6 @@ pub enum RagdollMode {
     /// It has fallen, and its policy gets it up. Only the plugin writes this, for tasks that report
     /// [`rising`](marathon_envs::Spec::rising); an app that sets it gets `Powered`.
     GettingUp,
+    /// A [`PlayClip`](crate::PlayClip) moves it. Only the plugin writes this.
+    Animated,
 }

@@ -1,7 +1,8 @@
 //! The plugin: its systems and their order.
 
 use crate::actuation;
-use crate::asset::{MjcfLoader, PolicyAsset, PolicyLoader, RagdollPrefab};
+use crate::animation::{self, PlayClip};
+use crate::asset::{MjcfLoader, MotionClip, MotionLoader, PolicyAsset, PolicyLoader, RagdollPrefab};
 use crate::command::AgentCommand;
 use crate::contact;
 use crate::direction::{self, MoveDirection};
@@ -51,7 +52,9 @@ impl Plugin for MarathonPlugin {
         add_messages(app);
         app.init_asset::<RagdollPrefab>()
             .init_asset::<PolicyAsset>()
+            .init_asset::<MotionClip>()
             .init_asset_loader::<MjcfLoader>()
+            .init_asset_loader::<MotionLoader>()
             .init_asset_loader::<PolicyLoader>()
             .init_resource::<Marathon>()
             .configure_sets(
@@ -68,6 +71,7 @@ impl Plugin for MarathonPlugin {
                         levels::by_distance,
                         simulate::take_in,
                         actuation::take_in,
+                        animation::take_in,
                         contact::feel,
                         simulate::push,
                         levels::pack,
@@ -75,7 +79,7 @@ impl Plugin for MarathonPlugin {
                         .chain()
                         .in_set(MarathonSystems::Admit),
                     simulate::simulate.in_set(MarathonSystems::Simulate),
-                    (report::report, simulate::face_targets).chain().in_set(MarathonSystems::Report),
+                    (report::report, simulate::face_targets, animation::end).chain().in_set(MarathonSystems::Report),
                 ),
             )
             .add_systems(RunFixedMainLoop, (simulate::show, place::show).in_set(MarathonSystems::Show))
@@ -108,6 +112,7 @@ fn register_types(app: &mut App) {
         .register_type::<AgentCommand>()
         .register_type::<MoveDirection>()
         .register_type::<LaidGround>()
+        .register_type::<PlayClip>()
         .register_type::<Obstacle>()
         .register_type::<Collides>()
         .register_type::<Lod>()

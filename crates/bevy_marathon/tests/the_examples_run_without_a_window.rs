@@ -3,6 +3,9 @@
 #![cfg(feature = "window")]
 
 #[allow(dead_code, reason = "its window stays closed")]
+#[path = "../examples/animation.rs"]
+mod animation;
+#[allow(dead_code, reason = "its window stays closed")]
 #[path = "../examples/crowd.rs"]
 mod crowd;
 #[allow(dead_code, reason = "its command line is left out")]
@@ -74,6 +77,20 @@ fn the_humanoid_runs() {
         world.query::<&Episode>().iter(world).any(|episode| episode.farthest > 1.0)
     });
     assert_eq!(app.world_mut().query::<&FollowCamera>().iter(app.world()).count(), 1);
+}
+
+#[test]
+fn the_walker_goes_back_to_its_clip() {
+    let mut app = windowless(animation::stroll);
+    let mode = |world: &mut World| world.query::<&RagdollMode>().iter(world).next().copied();
+    let mut far = 0.0_f32;
+    run_until(&mut app, "a clip", |world| mode(world) == Some(RagdollMode::Animated));
+    for wanted in [RagdollMode::Powered, RagdollMode::Animated, RagdollMode::Powered, RagdollMode::Animated] {
+        run_until(&mut app, "the next mode", |world| mode(world) == Some(wanted));
+        let world = app.world_mut();
+        far = world.query::<&CharacterPose>().iter(world).map(|pose| pose.position.length()).fold(far, f32::max);
+    }
+    assert!(far > 5.0, "{far} m");
 }
 
 #[test]

@@ -242,6 +242,10 @@ impl CharacterBatch {
             if self.lanes[lane].as_ref().is_some_and(|slot| slot.asleep.is_some()) {
                 continue;
             }
+            if self.animate(lane) {
+                self.record(lane, time, false);
+                continue;
+            }
             let fresh = self.judge(lane);
             if fresh {
                 self.reset(lane);

@@ -7,6 +7,7 @@ mod batch;
 mod detector;
 mod event;
 mod lane_state;
+mod playing;
 mod power;
 mod saved;
 mod sleep;
@@ -15,6 +16,7 @@ mod slot;
 pub(crate) use batch::CharacterBatch;
 pub(crate) use event::Event;
 pub(crate) use lane_state::{KindIdentity, LaneState};
+pub(crate) use playing::Playing;
 pub use slot::PoseSample;
 pub(crate) use slot::{Shove, Slot};
 

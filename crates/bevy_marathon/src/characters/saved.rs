@@ -137,6 +137,9 @@ impl CharacterBatch {
         if slot.history.is_empty() || !slot.history.iter().all(pose) {
             return Err(SnapshotError::Damaged("its poses belong to another model"));
         }
+        if slot.playing.as_ref().is_some_and(|playing| !playing.fits(model)) {
+            return Err(SnapshotError::Damaged("its clip belongs to another model"));
+        }
         if slot.pushes.iter().any(|push| push.body >= model.bodies.len()) {
             return Err(SnapshotError::Damaged("it pushes a body that the model does not have"));
         }

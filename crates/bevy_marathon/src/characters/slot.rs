@@ -3,6 +3,7 @@
 use super::detector::Progress;
 use super::event::Event;
 use super::lane_state::LaneState;
+use super::playing::Playing;
 use crate::limbs::Limbs;
 use crate::lod::Lod;
 use crate::mode::RagdollMode;
@@ -59,6 +60,8 @@ pub(crate) struct Slot {
     /// The mode that its component had when the plugin last read or wrote it.
     #[serde(skip)]
     pub shown_mode: RagdollMode,
+    /// The clip that moves it in place of the physics.
+    pub playing: Option<Playing>,
     pub(super) pushes: Vec<Shove>,
     pub(super) blows: Blows,
     /// Factors of its actuators' forces in the physics.
@@ -129,6 +132,7 @@ impl Slot {
             strength: LimbStrength::default(),
             reactions: None,
             shown_mode: RagdollMode::default(),
+            playing: None,
             pushes: Vec::new(),
             blows: Blows::default(),
             factors: Vec::new(),
@@ -165,13 +169,14 @@ impl Slot {
     pub fn mode(&self) -> RagdollMode {
         match () {
             () if self.is_limp() => RagdollMode::Limp,
+            () if self.playing.is_some() => RagdollMode::Animated,
             () if self.progress.rising => RagdollMode::GettingUp,
             () => RagdollMode::Powered,
         }
     }
 
     /// Whether it has no strength.
-    pub(super) fn is_limp(&self) -> bool {
+    pub fn is_limp(&self) -> bool {
         self.limp || self.lying.is_some()
     }
 
