@@ -73,7 +73,7 @@ fn leave(mut commands: Commands, time: Res<Time>, mut hits: MessageReader<HitRec
     }
 }
 
-/// Who stands again goes on walking.
+/// A character that stands again goes on walking.
 fn recover(mut commands: Commands, time: Res<Time>, walk: Res<Walk>, hit: Query<(Entity, &Hit, &RagdollMode)>) {
     for (entity, since, mode) in &hit {
         if *mode == RagdollMode::Powered && time.elapsed_secs() - since.0 > RECOVERY {

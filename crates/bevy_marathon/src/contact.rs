@@ -78,20 +78,41 @@ pub(crate) fn feel(
     mut passing: Local<Passing>,
 ) {
     let dt = time.timestep().as_secs_f32();
-    let mut solids = Vec::new();
+    let (mut solids, mut apps) = (Vec::new(), Vec::new());
     for (entity, obstacle, mut motion) in &mut obstacles {
         let Ok(place) = transforms.compute_global_transform(entity) else { continue };
-        solids.extend(solid_of(obstacle, &place, &mut motion, marathon.now, dt));
+        apps.extend(solid_of(obstacle, &place, &mut motion, marathon.now, dt));
     }
-    let mut bodies = Vec::new();
+    let mut all = Vec::new();
     for (entity, key, anatomy, collides) in ragdolls.iter().filter(|(.., collides)| collides.any()) {
-        let Some(slot) = marathon.slot(*key).filter(|slot| slot.asleep.is_none()) else { continue };
-        let (Some(sample), Ok(track)) = (slot.history.back(), transforms.compute_global_transform(entity)) else {
-            continue;
-        };
-        let Some(around) = pose::around(&anatomy.model, &sample.qpos, &sample.qvel) else { continue };
-        let (track, at) = (track.affine(), (key, *collides, sample));
-        bodies.push(body(entity, &anatomy.model, track, &around, at, &mut solids));
+        let awake = marathon.slot(*key).is_some_and(|slot| slot.asleep.is_none());
+        if let (true, Ok(track)) = (awake, transforms.compute_global_transform(entity)) {
+            all.push((entity, *key, anatomy, *collides, track.affine()));
+        }
+    }
+    let balls: Vec<(Vec3, f32)> =
+        all.iter().map(|(_, key, anatomy, _, track)| ball(&marathon, *key, anatomy, track)).collect();
+    let (mut bodies, mut alone) = (Vec::new(), Vec::new());
+    for (i, (entity, key, anatomy, collides, track)) in all.into_iter().enumerate() {
+        // most characters of a crowd touch nothing: their limbs need not be known
+        let (center, reach) = balls[i];
+        let meets = |place: Vec3, radius: f32| center.distance(place) < reach + radius + NEAR;
+        let others = || balls.iter().enumerate().any(|(j, (place, radius))| j != i && meets(*place, *radius));
+        let near = apps.iter().any(|solid: &Solid| meets(solid.place, solid.radius)) || collides.characters && others();
+        let sample = marathon.slot(key).and_then(|slot| slot.history.back()).filter(|_| near);
+        let around = sample.and_then(|s| Some((s, pose::around(&anatomy.model, &s.qpos, &s.qvel)?)));
+        match around {
+            Some((sample, around)) => {
+                bodies.push(body(entity, &anatomy.model, track, &around, (&key, collides, sample), &mut solids));
+            }
+            None => alone.push(key),
+        }
+    }
+    solids.extend(apps);
+    for key in alone {
+        if let Some(batch) = marathon.batch(key) {
+            batch.feel(key.lane, &[]);
+        }
     }
     passing.update(&bodies, &solids);
     for own in &bodies {
@@ -107,6 +128,17 @@ pub(crate) fn feel(
         if let Some(batch) = marathon.batch(own.key) {
             batch.feel(own.key.lane, &told);
         }
+    }
+}
+
+/// A ball that holds a character in any pose: around its root body, or without bounds if it has several.
+fn ball(marathon: &Marathon, key: RagdollState, anatomy: &Anatomy, track: &Affine3A) -> (Vec3, f32) {
+    let reach = marathon.kinds.get(key.kind).and_then(|kind| kind.reach);
+    let sample = marathon.slot(key).and_then(|slot| slot.history.back());
+    let root = || sample?.qpos.get(anatomy.model.joints.first()?.qpos_adr..)?.first_chunk::<3>().copied();
+    match (reach, root()) {
+        (Some(reach), Some(root)) => (track.transform_point3(to_game(root)), reach),
+        _ => (Vec3::ZERO, f32::INFINITY),
     }
 }
 

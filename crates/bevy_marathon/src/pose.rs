@@ -101,6 +101,27 @@ pub fn root_motion(model: &Model, qpos: &[f64], qvel: &[f64]) -> Option<RootMoti
     Some(RootMotion { place, linear, angular })
 }
 
+/// Radius of a ball around the root body that holds a model in any pose, m. `None` unless all its joints belong to one tree with
+/// a free root.
+pub fn reach(model: &Model) -> Option<f32> {
+    let free = model.joints.first().filter(|joint| joint.kind == JointType::Free)?;
+    let roots = model.joints.iter().filter(|joint| model.bodies[joint.body].parent == 0);
+    if roots.count() != 1 {
+        return None;
+    }
+    let slides = model.joints.iter().skip(1).any(|joint| joint.kind == JointType::Slide);
+    let length = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let moving = model.geoms.iter().filter(|geom| model.bodies[geom.body].weld_id != 0);
+    let far = moving.map(|geom| {
+        let up = std::iter::successors(Some(geom.body), |body| Some(model.bodies[*body].parent));
+        let way: f64 =
+            up.take_while(|body| *body != free.body && *body != 0).map(|body| length(model.bodies[body].pos)).sum();
+        way + length(geom.pos) + length(geom.size)
+    });
+    let far = far.fold(0.0, f64::max);
+    (!slides && far > 0.0).then_some(far as f32)
+}
+
 /// A configuration after a moment at a velocity, to first order.
 fn advanced(model: &Model, qpos: &[f64], qvel: &[f64], seconds: f64) -> Vec<f64> {
     let mut q = qpos.to_vec();
@@ -188,6 +209,21 @@ mod tests {
             "<mujoco><worldbody><body><joint type='slide' axis='1 0 0'/><geom size='.1'/></body></worldbody></mujoco>";
         let model = Model::from_xml_str(text, "slider")?;
         assert_eq!((heading(&model, &[1.0]), own_velocity(&model, &[0.0], &[1.0], 0.1)), (0.0, None));
+        Ok(())
+    }
+
+    #[test]
+    fn a_reach_holds_every_pose() -> Result<(), Box<dyn std::error::Error>> {
+        let of = |xml: &str| Model::from_xml_str(&format!("<mujoco><worldbody>{xml}</worldbody></mujoco>"), "reach");
+        let arm = "<body pos='0 0 .5'><joint axis='0 1 0'/><geom type='capsule' size='.1 .2' pos='0 0 .3'/></body>";
+        let model = of(&format!("<body pos='0 0 7'><freejoint/><geom size='.1'/>{arm}</body>"))?;
+        let reach = reach(&model).ok_or("one root")?;
+        assert!((1.0..1.2).contains(&reach), "{reach}");
+        for xml in
+            [arm, "<body><freejoint/><geom size='.1'/></body><body pos='3 0 0'><freejoint/><geom size='.1'/></body>"]
+        {
+            assert_eq!(super::reach(&of(xml)?), None);
+        }
         Ok(())
     }
 

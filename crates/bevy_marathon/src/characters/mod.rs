@@ -24,6 +24,7 @@ use crate::asset::RagdollPrefab;
 use crate::error::RagdollError;
 use crate::ground::Ground;
 use crate::limbs::Limbs;
+use crate::pose;
 use crate::ragdoll::Character;
 use bevy::prelude::*;
 use marathon_envs::Spec;
@@ -55,6 +56,8 @@ pub(crate) struct CharacterKind {
     pub spec: Option<Arc<Spec>>,
     pub feet: Vec<Arc<str>>,
     pub limbs: Arc<Limbs>,
+    /// Radius of a ball around the root that holds a ragdoll in any pose, m. `None` if it has several roots, or one that is not free.
+    pub reach: Option<f32>,
     /// Physics steps per decision.
     substeps: usize,
     pub dt: f64,
@@ -89,6 +92,7 @@ impl CharacterKind {
             ground,
             collides,
             limbs: Arc::new(Limbs::of(&model, &feet)),
+            reach: pose::reach(&model),
             model,
             feet,
             substeps: spec.frame_skip,
@@ -121,6 +125,7 @@ impl CharacterKind {
             ground: Ground::Level,
             collides,
             limbs: Arc::new(Limbs::of(&model, &[])),
+            reach: pose::reach(&model),
             model,
             feet: Vec::new(),
             substeps,

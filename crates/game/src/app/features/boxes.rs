@@ -29,12 +29,14 @@ fn clear(mut commands: Commands, piles: Query<Entity, With<Pile>>) {
 }
 
 /// Puts the pile where the camera looks past the character.
+#[expect(clippy::too_many_arguments, reason = "a system names what it uses")]
 fn put(
     mut commands: Commands,
     mut actions: MessageReader<ActionPressed>,
     (mode, focus): (Res<State<Mode>>, Res<Focus>),
     actors: Query<(&Actor, &CharacterPose, &Collides)>,
-    (cameras, piles): (Query<&Transform, With<FollowCamera>>, Query<Entity, With<Pile>>),
+    cameras: Query<&Transform, With<FollowCamera>>,
+    piles: Query<Entity, With<Pile>>,
     mut notes: ResMut<Notifications>,
     (mut prefabs, mut model): (ResMut<Assets<RagdollPrefab>>, Local<Option<Handle<RagdollPrefab>>>),
 ) {
