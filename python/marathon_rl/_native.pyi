@@ -23,9 +23,15 @@ __all__ = [
     "VecEnv",
     "Viewer",
     "__version__",
+    "_check_size",
     "_clip",
+    "_count",
+    "_limits",
+    "_mask",
     "_policy",
+    "_seeds",
     "_spec",
+    "_train_result",
     "evaluate",
     "ids",
     "load_policy",
@@ -80,6 +86,11 @@ class Clip:
         """Write a ``.motion`` file."""
     def __eq__(self, other: object, /) -> bool: ...
 
+def _check_size(width: int, height: int) -> None: ...
+def _count(name: str, value: float, *, limited: bool = True) -> int: ...
+def _limits() -> list[tuple[str, int]]: ...
+def _mask(mask: npt.ArrayLike, num_envs: int, name: str = "mask") -> npt.NDArray[np.bool_]: ...
+def _seeds(seed: int | Sequence[int | None] | None) -> int | list[int | None] | None: ...
 def _clip(name: str, bytes: bytes) -> Clip: ...
 
 @final
@@ -171,13 +182,15 @@ class VecEnv:
     Arrays are row-major with one row per agent. Without `copy`, the environment owns the arrays that it returns and
     overwrites them at the next step; with `copy`, every step returns new ones.
 
+    One thread at a time may use an environment: another one gets a `RuntimeError`.
+
     `copy.deepcopy` and `pickle` make an environment that goes on as this one does. A process that was forked gets
     threads of its own.
     """
 
     def __new__(
         cls,
-        id: str,
+        id: str | PathLike[str],
         num_envs: int = 1,
         *,
         seed: int = 0,
@@ -186,13 +199,14 @@ class VecEnv:
         autoreset: Literal["next_step", "same_step", "disabled"] | str = "next_step",
         max_episode_steps: int | None = None,
         copy: bool = False,
-        dtype: Literal["float32", "float64"] | str | None = None,
+        dtype: npt.DTypeLike | None = None,
         **options: Any,
     ) -> VecEnv:
         """Make an environment. The results depend on none of `threads`, `isa` (but for f64) and `copy`.
 
         Args:
             id: name of the task, as in `marathon_rl.ids()`; case does not matter, and without a version it means v0.
+                The path of a model is a name of the task ``Robot``.
             num_envs: number of agents. More than fit into 16 GB are a `MemoryError`, whose text says how to allow them.
             seed: seed until `reset` gives another. It is a number, not chance: without one given, every environment
                 begins with the same episodes.
@@ -204,8 +218,8 @@ class VecEnv:
                 already, `final_obs` the last one of the old episode. "disabled": nothing; use `reset(mask=...)`.
             max_episode_steps: steps after which an episode is truncated; None means the task's own number.
             copy: whether every step returns new arrays.
-            dtype: type of the observations; None means that of the task, `Spec.dtype`. They are computed in 32 bits
-                whatever it is.
+            dtype: type of the observations, float32 or float64; None means that of the task, `Spec.dtype`. They are
+                computed in 32 bits whatever it is.
             **options: arguments of the task, see `Spec.options`.
         """
     @property
@@ -261,8 +275,8 @@ class VecEnv:
         """Start new episodes and return the observations, ``(num_envs, obs_size)``.
 
         A seed restarts the random streams: the same seed gives the same episodes. A sequence has a seed, or None, for
-        each agent, which then acts as the only agent of an environment with that seed. With a mask, ``(num_envs,)``,
-        only the chosen agents are reset.
+        each agent, which then acts as the only agent of an environment with that seed. With a mask of booleans,
+        ``(num_envs,)``, only the chosen agents are reset.
         """
     def step(
         self, actions: npt.ArrayLike
@@ -320,7 +334,7 @@ class VecEnv:
             friction: factors of all friction coefficients of contacts, ``(num_envs,)``.
             strength: factors of the actuators' forces, ``(num_envs, nu)``.
             gravity: gravity, m/s^2, ``(num_envs, 3)``.
-            mask: the agents, ``(num_envs,)``; None means all.
+            mask: the agents, booleans, ``(num_envs,)``; None means all.
         """
     @property
     def command(self) -> npt.NDArray[np.float64]:
@@ -333,7 +347,7 @@ class VecEnv:
 
         Args:
             command: numbers within the ranges of `spec.command`, ``(num_envs, len(spec.command))``.
-            mask: the agents, ``(num_envs,)``; None means all.
+            mask: the agents, booleans, ``(num_envs,)``; None means all.
         """
     def push(
         self,
@@ -351,7 +365,7 @@ class VecEnv:
             force: force, N, ``(num_envs, 3)``.
             torque: torque, N m, ``(num_envs, 3)``; None means none.
             body: the body's name, or its index in ``model.body_names``.
-            mask: the agents, ``(num_envs,)``; None means all.
+            mask: the agents, booleans, ``(num_envs,)``; None means all.
         """
     def ground(self, field: int = 0) -> npt.NDArray[np.float32]:
         """Ground of each agent: elevations, m above the zero of a height field, ``(num_envs, nrow, ncol)``.
@@ -368,7 +382,7 @@ class VecEnv:
             elevations: elevations, m above the zero of the height field: a grid for each agent, ``(num_envs, nrow,
                 ncol)``, or one for all, ``(nrow, ncol)``.
             field: index of the height field.
-            mask: the agents, ``(num_envs,)``; None means all.
+            mask: the agents, booleans, ``(num_envs,)``; None means all.
         """
     def save(self) -> bytes:
         """Everything that the future depends on.
@@ -387,7 +401,9 @@ class VecEnv:
 class Renderer:
     """Draws agents of one kind with a ray caster on the processor, followed by a camera. No window, no GPU."""
 
-    def __new__(cls, id: str, width: int = 480, height: int = 480, *, num_envs: int = 1, **options: Any) -> Renderer:
+    def __new__(
+        cls, id: str | PathLike[str], width: int = 480, height: int = 480, *, num_envs: int = 1, **options: Any
+    ) -> Renderer:
         """Make a renderer for pictures of `width` x `height` pixels with `num_envs` agents side by side.
 
         `options` are arguments of the task, see `Spec.options`: some change the model.
@@ -456,13 +472,13 @@ class TrainResult:
         """The run in numbers, as in ``summary.json``."""
 
 def train(
-    task: str | type[MarathonAgent] | MarathonAgent | None = None,
+    task: str | PathLike[str] | type[MarathonAgent] | MarathonAgent | None = None,
     config: str | PathLike[str] | dict[str, Any] | None = None,
     *,
     callback: Callable[[dict[str, float | None]], bool | None] | None = None,
     progress: bool = True,
     seed: int | None = None,
-    steps: int | None = None,
+    steps: float | None = None,
     num_envs: int | None = None,
     threads: int | None = None,
     out: str | PathLike[str] | None = None,
@@ -477,15 +493,16 @@ def train(
     `resume` goes on with it. The same seed gives the same policy, bit for bit, for any number of threads.
 
     Args:
-        task: its name, or a `MarathonAgent` class, whose functions are called once per step for all agents. An object
-            of the class stands for the class.
+        task: its name, the path of a model, or a `MarathonAgent` class, whose functions are called once per step for
+            all agents. An object of the class stands for the class.
         config: a file, or a dictionary with the same keys, such as ``{"ppo": {"lr": 3e-4}}``. The task's preset holds
-            for what it leaves out. A file of ML-Agents, or a dictionary like one, is imported.
+            for what it leaves out. Values may be numbers and arrays of NumPy. A file of ML-Agents, or a dictionary like
+            one, is imported.
         callback: called after every iteration with the numbers that ``progress.csv`` holds, such as ``steps``,
             ``return_mean`` (None if no episode ended), ``steps_per_second``; if it returns False, training stops.
         progress: show how far the run is on standard error: a bar in a terminal, a line now and then elsewhere.
         seed: seed of everything random.
-        steps: steps of all agents together.
+        steps: steps of all agents together, such as ``4e6``.
         num_envs: number of agents, a multiple of 16.
         threads: number of threads; 0 means one per processor core.
         out: a new folder for everything that the command ``marathon train`` writes; None means that nothing is written.
@@ -517,7 +534,12 @@ class Player:
 
 def _policy(bytes: bytes) -> Policy: ...
 def _spec(id: str, options: dict[str, Any], max_episode_steps: int) -> Spec: ...
-def load_policy(path: str | PathLike[str], task: str | type[MarathonAgent] | MarathonAgent | None = None) -> Policy:
+def _train_result(
+    policy: Policy, steps: int, interrupted: bool, folder: str | PathLike[str] | None, summary: str
+) -> TrainResult: ...
+def load_policy(
+    path: str | PathLike[str], task: str | PathLike[str] | type[MarathonAgent] | MarathonAgent | None = None
+) -> Policy:
     """Read a policy from a file, ``.safetensors`` or ``.onnx``, or from the folder of a run.
 
     Without `task`, it is for the one that the file names; with, a policy of another one is an error. ONNX files that
@@ -528,7 +550,7 @@ def evaluate(
     policy: Policy,
     episodes: int = 100,
     *,
-    task: str | type[MarathonAgent] | MarathonAgent | None = None,
+    task: str | PathLike[str] | type[MarathonAgent] | MarathonAgent | None = None,
     seed: int = ...,
     threads: int = 0,
     **options: Any,
@@ -694,7 +716,7 @@ class Simulation:
     def threads(self) -> int:
         """Number of threads."""
     def step(self, ctrl: npt.ArrayLike, substeps: int = 1) -> npt.NDArray[np.bool_]:
-        """Advance every agent by `substeps` physics steps under `ctrl`, ``(num_envs, nu)``.
+        """Advance every agent by `substeps` physics steps, 1 to 1000, under `ctrl`, ``(num_envs, nu)``.
 
         Returns which agents broke, ``(num_envs,)``: their states stopped being finite, so they were put into the
         reference configuration at rest.
@@ -721,7 +743,7 @@ class Simulation:
             force: force, N, ``(num_envs, 3)``.
             torque: torque, N m, ``(num_envs, 3)``; None means none.
             body: the body's name, or its index in ``model.body_names``.
-            mask: the agents, ``(num_envs,)``; None means all.
+            mask: the agents, booleans, ``(num_envs,)``; None means all.
         """
     def vary(
         self,
@@ -741,7 +763,7 @@ class Simulation:
             friction: factors of all friction coefficients of contacts, ``(num_envs,)``.
             strength: factors of the actuators' forces, ``(num_envs, nu)``.
             gravity: gravity, m/s^2, ``(num_envs, 3)``.
-            mask: the agents, ``(num_envs,)``; None means all.
+            mask: the agents, booleans, ``(num_envs,)``; None means all.
         """
     def ground(self, field: int = 0) -> npt.NDArray[np.float32]:
         """Ground of each agent: elevations, m above the zero of a height field, ``(num_envs, nrow, ncol)``.
@@ -757,7 +779,7 @@ class Simulation:
             elevations: elevations, m above the zero of the height field: a grid for each agent, ``(num_envs, nrow,
                 ncol)``, or one for all, ``(nrow, ncol)``.
             field: index of the height field.
-            mask: the agents, ``(num_envs,)``; None means all.
+            mask: the agents, booleans, ``(num_envs,)``; None means all.
         """
     def ground_height(self, x: npt.ArrayLike, y: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """Heights of the ground at places of the world, m, ``(num_envs, n)``.
@@ -817,7 +839,7 @@ class Simulation:
 def ids() -> list[str]:
     """Names of all registered tasks."""
 
-def spec(id: str, /, **options: Any) -> Spec:
+def spec(id: str | PathLike[str], /, **options: Any) -> Spec:
     """Facts of a task, by any of its names, with other values for some of its arguments."""
 
 def main(words: Sequence[str]) -> int:

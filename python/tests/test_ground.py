@@ -128,7 +128,7 @@ def test_ground_that_does_not_fit_is_refused(field: int, elevations: np.ndarray,
     sim = Simulation(Model.from_xml_string(MODEL), 2)
     with pytest.raises(ValueError, match=message):
         sim.set_ground(elevations, field)
-    with pytest.raises(ValueError, match=r"mask has the shape \(3,\), expected \(2,\)"):
+    with pytest.raises(ValueError, match=r"mask is bool \(3,\), expected a boolean array of shape \(2,\)"):
         sim.set_ground(np.zeros((5, 7)), mask=np.ones(3, bool))
 
 

@@ -199,8 +199,8 @@ def test_other_threads_run_while_it_steps() -> None:
         (lambda: ready().step(np.zeros((3, 4))), r"actions have the shape \(3, 4\), expected \(2, 4\)"),
         (lambda: ready().step(np.zeros(4)), r"actions have the shape \(4,\), expected \(2, 4\)"),
         (lambda: ready().step([[0, 0, 0, 0], [0, 0]]), "inhomogeneous"),
-        (lambda: ready().reset(mask=[True]), r"mask has the shape \(1,\), expected \(2,\)"),
-        (lambda: ready().reset(mask=True), r"mask has the shape \(\), expected \(2,\)"),
+        (lambda: ready().reset(mask=[True]), r"mask is bool \(1,\), expected a boolean array of shape \(2,\)"),
+        (lambda: ready().reset(mask=True), r"mask is bool, expected a boolean array of shape \(2,\)"),
         (lambda: ready().reset(seed=-1), r"seed is -1, expected a whole number from 0 to 2\*\*64 - 1"),
         (lambda: ready().reset(seed=[1, -2]), "seed is -2, expected a whole number"),
         (lambda: VecEnv("hopper", -1), "num_envs is -1, expected a whole number"),
@@ -238,7 +238,7 @@ def test_errors_say_what_was_found_and_what_was_expected(wrong, message: str) ->
     [
         (lambda: ready().reset(seed="3"), "seed is of type str, expected a whole number"),
         (lambda: ready().reset(seed=1.5), "seed is of type float, expected a whole number"),
-        (lambda: VecEnv("hopper", 2.0), "num_envs is of type float, expected a whole number"),
+        (lambda: VecEnv("hopper", "2"), "num_envs is of type str, expected a whole number"),
         (
             lambda: VecEnv("Hopper-v5", default_camera_config={}),
             "unexpected keyword argument 'default_camera_config': agent 'Hopper-v5' takes no option",

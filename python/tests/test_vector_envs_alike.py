@@ -292,7 +292,7 @@ WRONG: list[tuple[Callable[[Any], Any], str]] = [
     (lambda env: env.push(np.full((5, 3), np.nan), body=1), "agent 0: force is NaN, expected finite numbers"),
     (lambda env: env.push(np.zeros((5, 3)), body=99), r"body is 99, expected less than \d+"),
     (lambda env: env.push(np.zeros((5, 3)), body="nobody"), "the model has no body 'nobody'"),
-    (lambda env: env.push(np.zeros((5, 3)), body=1, mask=[True]), r"mask has the shape \(1,\), expected \(5,\)"),
+    (lambda env: env.push(np.zeros((5, 3)), body=1, mask=[True]), r"mask is bool \(1,\), expected a boolean array"),
     (lambda env: env.vary(friction=np.ones(4)), r"friction has the shape \(4,\), expected \(5,\)"),
     (lambda env: env.vary(friction=[1, 1, -1, 1, 1]), "agent 2: friction is -1, expected a factor of 0 or more"),
     (lambda env: env.vary(gravity=np.full((5, 3), np.inf)), "agent 0: gravity is inf, expected finite numbers"),

@@ -3,10 +3,11 @@
 use crate::error;
 use marathon_envs::{EnvError, ObsNumber, Spec, StepMut, VecEnv};
 use numpy::{
-    AllowTypeChange, Element, PyArray, PyArray1, PyArray2, PyArrayLike, PyArrayMethods, PyReadonlyArray2,
-    PyReadwriteArray, PyUntypedArrayMethods,
-    ndarray::{Dimension, Ix1},
+    AllowTypeChange, Element, PyArray, PyArray1, PyArray2, PyArrayDescr, PyArrayDescrMethods, PyArrayLike,
+    PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray, PyUntypedArray, PyUntypedArrayMethods,
+    ndarray::Dimension,
 };
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use std::borrow::Cow;
 
@@ -218,16 +219,34 @@ where
     D: Dimension + 'py,
     Vec<T>: for<'a> FromPyObject<'a, 'py>,
 {
+    if let Ok(array) = value.cast::<PyUntypedArray>() {
+        check_numbers(name, &array.dtype())?;
+    }
     match value.extract::<PyArrayLike<'py, T, D, AllowTypeChange>>() {
         Ok(array) if array.shape() == expected => Ok(array),
         other => {
-            // what is no array at all has no shape either, and an error of NumPy's own
-            let found: Vec<usize> = value.py().import("numpy")?.call_method1("shape", (value,))?.extract()?;
+            // lists of different lengths have no shape, and an error of NumPy's own
+            let array = value.py().import("numpy")?.call_method1("asarray", (value,))?;
+            let array = array.cast::<PyUntypedArray>()?;
+            let found = array.shape();
+            if found.is_empty() && !b"biuf".contains(&array.dtype().kind()) {
+                let found = value.get_type().name()?;
+                return Err(PyTypeError::new_err(format!("{name} the type {found}, expected an array of numbers")));
+            }
+            check_numbers(name, &array.dtype())?;
             if found == expected {
                 return other;
             }
-            Err(error::value(format!("{name} the shape {}, expected {}", tuple(&found), tuple(&expected))))
+            Err(error::value(format!("{name} the shape {}, expected {}", tuple(found), tuple(&expected))))
         }
+    }
+}
+
+/// Refuses arrays of other things than real numbers; NumPy would drop the imaginary parts of complex ones.
+pub fn check_numbers(name: &str, dtype: &Bound<'_, PyArrayDescr>) -> PyResult<()> {
+    match dtype.kind() {
+        b'b' | b'i' | b'u' | b'f' => Ok(()),
+        _ => Err(PyTypeError::new_err(format!("{name} the type {dtype}, expected real numbers"))),
     }
 }
 
@@ -242,6 +261,29 @@ pub fn tuple(shape: &[usize]) -> String {
 /// A mask of `n` agents as a list; all agents without one.
 pub fn mask(mask: Option<&Bound<'_, PyAny>>, n: usize) -> PyResult<Vec<bool>> {
     let Some(mask) = mask else { return Ok(vec![true; n]) };
-    let mask = of_shape::<bool, Ix1, 1>("mask has", mask, [n])?;
-    Ok(mask.as_array().to_vec())
+    Ok(flags("mask", mask, n)?.as_array().to_vec())
+}
+
+/// A mask of `n` agents: a boolean array, or a list of True and False. Numbers are none: indices would pass for flags.
+pub fn flags<'py>(name: &str, mask: &Bound<'py, PyAny>, n: usize) -> PyResult<PyReadonlyArray1<'py, bool>> {
+    let array = mask.py().import("numpy")?.call_method1("asarray", (mask,)).ok();
+    let found = match array.as_ref().map(|array| array.cast::<PyUntypedArray>()) {
+        Some(Ok(array)) if !array.shape().is_empty() => {
+            if let Ok(flags) = array.cast::<PyArray1<bool>>()
+                && flags.len() == n
+            {
+                return flags.try_readonly().map_err(|e| error::value(format!("{name} cannot be read: {e}")));
+            }
+            format!("{} {}", array.dtype(), tuple(array.shape()))
+        }
+        _ => mask.get_type().name()?.to_string(),
+    };
+    Err(error::value(format!("{name} is {found}, expected a boolean array of shape ({n},)")))
+}
+
+/// A mask as an array, for the environments that are written in Python.
+#[pyfunction]
+#[pyo3(signature = (mask, num_envs, name = "mask"))]
+pub fn _mask<'py>(mask: &Bound<'py, PyAny>, num_envs: usize, name: &str) -> PyResult<Bound<'py, PyArray1<bool>>> {
+    Ok((*flags(name, mask, num_envs)?).clone())
 }

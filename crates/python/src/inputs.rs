@@ -2,12 +2,14 @@
 //!
 //! All rows are checked before an agent gets its own, so a wrong one changes nothing.
 
-use crate::arrays::{mask, of_shape, rows, tuple};
+use crate::arrays::{check_numbers, mask, of_shape, rows, tuple};
 use crate::error;
 use crate::model::Model;
 use marathon_physics::Variation;
 use numpy::ndarray::{Ix1, Ix2};
-use numpy::{AllowTypeChange, PyArray1, PyArray3, PyArrayLikeDyn, PyArrayMethods};
+use numpy::{
+    AllowTypeChange, PyArray1, PyArray3, PyArrayLikeDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 /// An argument that may be missing.
@@ -104,6 +106,9 @@ impl Grounds {
     /// Reads the arguments of `set_ground` for `n` agents: one grid for each agent, or one for all.
     pub fn read(grid: [usize; 2], n: usize, elevations: &Bound<'_, PyAny>, mask: Given<'_, '_>) -> PyResult<Self> {
         let [rows, columns] = grid;
+        if let Ok(array) = elevations.cast::<PyUntypedArray>() {
+            check_numbers("elevations have", &array.dtype())?;
+        }
         let (chosen, points) = (self::mask(mask, n)?, rows * columns);
         let shape: Vec<usize> = elevations.py().import("numpy")?.call_method1("shape", (elevations,))?.extract()?;
         if shape != [n, rows, columns] && shape != grid {

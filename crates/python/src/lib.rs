@@ -6,9 +6,13 @@
 
 mod arrays;
 mod batch_task;
+mod borrow;
+mod choices;
 mod clip;
+mod config;
 mod error;
 mod inputs;
+mod interrupt;
 mod model;
 mod number;
 mod options;
@@ -30,10 +34,10 @@ use std::ffi::OsString;
 mod _native {
     #[pymodule_export]
     use super::{
-        clip::_clip, clip::Clip, main, model::Model, players::Player, policy::_policy, policy::Policy,
-        policy::evaluate, policy::load_policy, renderer::Renderer, simulation::Simulation, spec::_spec,
-        spec::CommandRange, spec::Spec, spec::ids, spec::spec, train::TrainResult, train::train, vec_env::VecEnv,
-        viewer::Viewer,
+        arrays::_mask, clip::_clip, clip::Clip, main, model::Model, number::_count, number::_seeds, players::Player,
+        policy::_policy, policy::Policy, policy::evaluate, policy::load_policy, renderer::_check_size,
+        renderer::Renderer, simulation::Simulation, spec::_limits, spec::_spec, spec::CommandRange, spec::Spec,
+        spec::ids, spec::spec, train::_train_result, train::TrainResult, train::train, vec_env::VecEnv, viewer::Viewer,
     };
     use pyo3::prelude::*;
 

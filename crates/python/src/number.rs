@@ -1,9 +1,10 @@
-//! Whole numbers as arguments: those that cannot be are refused with their names.
+//! Whole numbers as arguments: those that cannot be are refused with their names. Numbers of things may be floats without
+//! a fraction, such as `4e6`; seeds and indices may not.
 
 use crate::error;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::PyInt;
+use pyo3::types::{PyBytes, PyInt, PyString};
 
 /// A number that an argument can be.
 pub trait Whole: Sized {
@@ -14,7 +15,7 @@ impl Whole for u64 {
     fn read(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
         match value.extract() {
             Ok(number) => Ok(number),
-            Err(_) if value.is_instance_of::<PyInt>() || value.hasattr("__index__")? => {
+            Err(_) if is_whole(value)? => {
                 Err(error::value(format!("{name} is {}, expected a whole number from 0 to 2**64 - 1", value.str()?)))
             }
             Err(_) => {
@@ -38,7 +39,23 @@ impl<N: Whole> Whole for Option<N> {
     }
 }
 
-/// A function per argument, for `from_py_with`.
+/// Whether Python takes the value for a whole number.
+fn is_whole(value: &Bound<'_, PyAny>) -> PyResult<bool> {
+    Ok(value.is_instance_of::<PyInt>() || value.hasattr("__index__")?)
+}
+
+/// A number of things: the value itself, or the whole number that a float is.
+fn amount<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    if is_whole(value)? || !value.hasattr("is_integer")? {
+        return Ok(value.clone());
+    }
+    if value.call_method0("is_integer")?.is_truthy()? {
+        return value.call_method0("__int__");
+    }
+    Err(error::value(format!("{name} is {}, expected a whole number", value.str()?)))
+}
+
+/// Converters for seeds and indices, for `from_py_with`.
 macro_rules! arguments {
     ($($name:ident),*) => {
         $(pub fn $name<N: Whole>(value: &Bound<'_, PyAny>) -> PyResult<N> {
@@ -47,7 +64,18 @@ macro_rules! arguments {
     };
 }
 
-arguments!(body, field, seed, max_episode_steps, steps, substeps);
+arguments!(body, field, seed);
+
+/// Converters for numbers of steps.
+macro_rules! amounts {
+    ($($name:ident),*) => {
+        $(pub fn $name<N: Whole>(value: &Bound<'_, PyAny>) -> PyResult<N> {
+            N::read(stringify!($name), &amount(stringify!($name), value)?)
+        })*
+    };
+}
+
+amounts!(max_episode_steps, steps, substeps);
 
 /// A number of things, each of which takes memory or time.
 pub trait Count: Sized {
@@ -69,16 +97,35 @@ impl<N: Count> Count for Option<N> {
     }
 }
 
+/// A number of things within the limit.
+pub fn count<N: Whole + Count>(name: &str, value: &Bound<'_, PyAny>) -> PyResult<N> {
+    N::read(name, &amount(name, value)?)?.check(name)
+}
+
 /// Converters for numbers of things, with their limit.
 macro_rules! counts {
     ($($name:ident),*) => {
         $(pub fn $name<N: Whole + Count>(value: &Bound<'_, PyAny>) -> PyResult<N> {
-            N::read(stringify!($name), value)?.check(stringify!($name))
+            count(stringify!($name), value)
         })*
     };
 }
 
 counts!(num_envs, threads, episodes, width, height);
+
+/// A port of this computer.
+pub fn port(value: &Bound<'_, PyAny>) -> PyResult<u16> {
+    match value.extract() {
+        Ok(port) => Ok(port),
+        Err(_) if is_whole(value)? => {
+            Err(error::value(format!("port is {}, expected a whole number from 0 to 65535", value.str()?)))
+        }
+        Err(_) => {
+            let found = value.get_type().name()?;
+            Err(PyTypeError::new_err(format!("port is of type {found}, expected a whole number")))
+        }
+    }
+}
 
 /// Seeds of a reset.
 pub enum Seeds {
@@ -94,7 +141,8 @@ pub fn seeds(value: &Bound<'_, PyAny>) -> PyResult<Option<Seeds>> {
     if value.is_instance_of::<PyInt>() || value.hasattr("__index__")? && !value.hasattr("__len__")? {
         return Ok(Some(Seeds::One(seed(value)?)));
     }
-    let Ok(each) = value.try_iter() else {
+    let is_text = value.is_instance_of::<PyString>() || value.is_instance_of::<PyBytes>();
+    let Some(each) = value.try_iter().ok().filter(|_| !is_text) else {
         let found = value.get_type().name()?;
         return Err(PyTypeError::new_err(format!(
             "seed is of type {found}, expected a whole number, a sequence with one or None for each agent, or None"
@@ -102,4 +150,22 @@ pub fn seeds(value: &Bound<'_, PyAny>) -> PyResult<Option<Seeds>> {
     };
     let each = each.map(|one| seed(&one?)).collect::<PyResult<_>>()?;
     Ok(Some(Seeds::Each(each)))
+}
+
+/// The seeds of a reset, checked, for the environments that are written in Python.
+#[pyfunction]
+pub fn _seeds<'py>(seed: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let py = seed.py();
+    match seeds(seed)? {
+        None => Ok(py.None().into_bound(py)),
+        Some(Seeds::One(seed)) => Ok(seed.into_pyobject(py)?.into_any()),
+        Some(Seeds::Each(each)) => Ok(each.into_pyobject(py)?.into_any()),
+    }
+}
+
+/// A number of things, checked, for what is written in Python.
+#[pyfunction]
+#[pyo3(signature = (name, value, *, limited = true))]
+pub fn _count(name: &str, value: &Bound<'_, PyAny>, limited: bool) -> PyResult<usize> {
+    if limited { count(name, value) } else { usize::read(name, &amount(name, value)?) }
 }

@@ -2,12 +2,13 @@
 
 use crate::arrays::tuple;
 use crate::task::{self, Task};
-use crate::{batch_task, error, number, options as arguments};
+use crate::{batch_task, error, interrupt, number, options as arguments};
 use marathon_envs::BLOCK;
 use marathon_learn::{BlockPolicy, EvalOptions, evaluate as play};
 use marathon_physics::lanes::Isa;
 use marathon_runs::{TaskConfig, policy_file};
 use numpy::{AllowTypeChange, PyArray1, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::exceptions::PyFileNotFoundError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
@@ -111,9 +112,16 @@ pub fn _policy(bytes: &[u8]) -> PyResult<Policy> {
 /// none.
 #[pyfunction]
 #[pyo3(signature = (path, task = None))]
-pub fn load_policy(py: Python<'_>, path: PathBuf, task: Option<Task>) -> PyResult<Policy> {
+pub fn load_policy(
+    py: Python<'_>,
+    path: PathBuf,
+    #[pyo3(from_py_with = task::optional)] task: Option<Task>,
+) -> PyResult<Policy> {
     let spec = task.map(|task| task.spec(py)).transpose()?;
-    let policy = policy_file::read(&path, spec.as_ref()).map_err(error::run)?;
+    let policy = policy_file::read(&path, spec.as_ref()).map_err(|error| match path.exists() {
+        true => error::run(error),
+        false => PyFileNotFoundError::new_err(error.to_string()),
+    })?;
     Ok(Policy(policy))
 }
 
@@ -121,14 +129,14 @@ pub fn load_policy(py: Python<'_>, path: PathBuf, task: Option<Task>) -> PyResul
 /// `length_mean` (decisions), `distance_mean` (m), `speed_mean` (m/s), `falls`, `diverged` and `episodes`. `task` is needed
 /// for agents that are written in Python; without, it is the policy's own. `options`: options of the task. Those of a task
 /// with a name that are not given are the ones that the policy was trained with; a class gets them as arguments of its
-/// constructor.
+/// constructor. Ctrl-C ends it.
 #[pyfunction]
 #[pyo3(signature = (policy, episodes = 100, *, task = None, seed = EvalOptions::default().seed, threads = 0, **options))]
 pub fn evaluate<'py>(
     py: Python<'py>,
     policy: &Policy,
     #[pyo3(from_py_with = number::episodes)] episodes: usize,
-    task: Option<Task>,
+    #[pyo3(from_py_with = task::optional)] task: Option<Task>,
     #[pyo3(from_py_with = number::seed)] seed: u64,
     #[pyo3(from_py_with = number::threads)] threads: usize,
     options: Option<&Bound<'_, PyDict>>,
@@ -148,7 +156,7 @@ pub fn evaluate<'py>(
             let task_config = if asked.agent == noted.agent { noted } else { asked };
             let given = arguments::read(name, given)?.into();
             let factory = task_config.with(&given).and_then(|task_config| task_config.factory()).map_err(error::run)?;
-            py.detach(|| play(&*factory, Isa::best(), &policy.0, &options))
+            interrupt::playing(py, &*factory, |factory| play(factory, Isa::best(), &policy.0, &options))?
         }
     };
     Ok(json(py, &result.map_err(error::learn)?)?.cast_into()?)

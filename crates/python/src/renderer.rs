@@ -26,13 +26,13 @@ impl Renderer {
     #[new]
     #[pyo3(signature = (id, width = 480, height = 480, *, num_envs = 1, **options))]
     fn new(
-        id: &str,
+        #[pyo3(from_py_with = task::name)] id: String,
         #[pyo3(from_py_with = number::width)] width: usize,
         #[pyo3(from_py_with = number::height)] height: usize,
         #[pyo3(from_py_with = number::num_envs)] num_envs: usize,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let id = task::plain(id);
+        let id = task::plain(&id);
         let TaskConfig { agent, options } = options::set(id, options)?;
         let agent = registry::global().agent_with(&agent, &options).map_err(error::env)?;
         Self::with(&agent.model().map_err(error::env)?, width, height, num_envs)
@@ -66,6 +66,15 @@ impl Renderer {
         let image = py.detach(|| self.renderer.render(&frame, &camera));
         PyArray1::from_slice(py, image.rgb()).reshape([image.height(), image.width(), 3])
     }
+}
+
+/// Checks the size of pictures.
+#[pyfunction]
+pub fn _check_size(
+    #[pyo3(from_py_with = number::width)] width: usize,
+    #[pyo3(from_py_with = number::height)] height: usize,
+) -> PyResult<()> {
+    marathon_render::Renderer::new(width, height).map(|_| ()).map_err(error::any)
 }
 
 impl Renderer {

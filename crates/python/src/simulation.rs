@@ -1,6 +1,7 @@
 //! The bare physics of many agents as a Python object: controls in, readings out, no task.
 
 use crate::arrays::{mask, of_shape, rows};
+use crate::borrow::{exclusive, shared};
 use crate::inputs::{self, Constants, Grounds, grounds_array};
 use crate::model::Model;
 use crate::{error, number};
@@ -16,6 +17,9 @@ use std::sync::Mutex;
 
 /// Most threads. Each has working memory of its own.
 const MOST_THREADS: usize = 1024;
+
+/// Most physics steps of one call: as many as a step of an environment has. Ctrl-C waits for the end of a call.
+const MOST_SUBSTEPS: usize = 1000;
 
 /// Agents per thread that are worth a thread.
 const AGENTS_PER_THREAD: usize = 64;
@@ -83,40 +87,41 @@ impl Simulation {
 
     /// The model.
     #[getter]
-    fn model(&self, py: Python<'_>) -> Py<Model> {
-        self.model.clone_ref(py)
+    fn model(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<Model>> {
+        Ok(shared(slf)?.model.clone_ref(py))
     }
 
     /// Number of agents.
     #[getter]
-    fn num_envs(&self) -> usize {
-        self.num_envs
+    fn num_envs(slf: &Bound<'_, Self>) -> PyResult<usize> {
+        Ok(shared(slf)?.num_envs)
     }
 
     /// Number of threads.
     #[getter]
-    fn threads(&self) -> usize {
-        self.threads
+    fn threads(slf: &Bound<'_, Self>) -> PyResult<usize> {
+        Ok(shared(slf)?.threads)
     }
 
-    /// Advances every agent by `substeps` physics steps under `ctrl`, `(num_envs, nu)`.
+    /// Advances every agent by `substeps` physics steps, at most 1000, under `ctrl`, `(num_envs, nu)`.
     ///
     /// Returns which agents broke, `(num_envs,)`: their states stopped being finite, so they were put into the reference
     /// configuration at rest.
     #[pyo3(signature = (ctrl, substeps = 1))]
     fn step<'py>(
-        &mut self,
+        slf: &Bound<'_, Self>,
         py: Python<'py>,
         ctrl: &Bound<'py, PyAny>,
         #[pyo3(from_py_with = number::substeps)] substeps: usize,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        if substeps == 0 {
-            return Err(error::value("substeps is 0, expected at least 1"));
+        let this = &mut *exclusive(slf)?;
+        if !(1..=MOST_SUBSTEPS).contains(&substeps) {
+            return Err(error::value(format!("substeps is {substeps}, expected 1 to {MOST_SUBSTEPS}")));
         }
-        let ctrl = of_shape::<f64, Ix2, 2>("ctrl has", ctrl, [self.num_envs, self.model.get().inner.nu])?;
-        self.read.clear();
-        let (ctrl, n) = (rows(&ctrl), self.num_envs);
-        let batch = self.batch();
+        let ctrl = of_shape::<f64, Ix2, 2>("ctrl has", ctrl, [this.num_envs, this.model.get().inner.nu])?;
+        this.read.clear();
+        let (ctrl, n) = (rows(&ctrl), this.num_envs);
+        let batch = this.batch();
         let broken = py.detach(|| batch.step(&ctrl, substeps));
         let mut out = vec![false; n];
         for agent in broken {
@@ -129,23 +134,24 @@ impl Simulation {
     /// `qvel`, `(num_envs, nv)`. Quaternions are normalized; controls, pushes and contacts are forgotten.
     #[pyo3(signature = (qpos, qvel, mask = None))]
     fn reset(
-        &mut self,
+        slf: &Bound<'_, Self>,
         qpos: &Bound<'_, PyAny>,
         qvel: &Bound<'_, PyAny>,
         mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let mask = self::mask(mask, self.num_envs)?;
-        let model = &self.model.get().inner;
-        let qpos = of_shape::<f64, Ix2, 2>("qpos has", qpos, [self.num_envs, model.nq])?;
-        let qvel = of_shape::<f64, Ix2, 2>("qvel has", qvel, [self.num_envs, model.nv])?;
+        let this = &mut *exclusive(slf)?;
+        let mask = self::mask(mask, this.num_envs)?;
+        let model = &this.model.get().inner;
+        let qpos = of_shape::<f64, Ix2, 2>("qpos has", qpos, [this.num_envs, model.nq])?;
+        let qvel = of_shape::<f64, Ix2, 2>("qvel has", qvel, [this.num_envs, model.nv])?;
         let (qpos, qvel) = (qpos.as_array(), qvel.as_array());
         let chosen = || (0..mask.len()).filter(|i| mask[*i]);
         if let Some(i) = chosen().find(|i| !qpos.row(*i).iter().chain(qvel.row(*i)).all(|x| x.is_finite())) {
             return Err(error::value(format!("the state of agent {i} is not finite")));
         }
-        self.read.clear();
+        this.read.clear();
         for i in chosen() {
-            self.batch().reset(i, &qpos.row(i).to_vec(), &qvel.row(i).to_vec());
+            this.batch().reset(i, &qpos.row(i).to_vec(), &qvel.row(i).to_vec());
         }
         Ok(())
     }
@@ -154,16 +160,17 @@ impl Simulation {
     /// `(num_envs, 3)`, in world axes at the body's center of mass. It lasts until changed or until a reset.
     #[pyo3(signature = (force, torque = None, *, body, mask = None))]
     fn push(
-        &mut self,
+        slf: &Bound<'_, Self>,
         force: &Bound<'_, PyAny>,
         torque: Option<&Bound<'_, PyAny>>,
         body: &Bound<'_, PyAny>,
         mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let pushes = inputs::pushes(self.model.get(), self.num_envs, force, torque, body, mask)?;
-        self.read.clear();
+        let this = &mut *exclusive(slf)?;
+        let pushes = inputs::pushes(this.model.get(), this.num_envs, force, torque, body, mask)?;
+        this.read.clear();
         for (agent, force, torque) in pushes.each {
-            self.batch().push(agent, pushes.body, force, torque);
+            this.batch().push(agent, pushes.body, force, torque);
         }
         Ok(())
     }
@@ -173,18 +180,19 @@ impl Simulation {
     /// m/s^2, `(num_envs, 3)`. Omitted constants have the model's values. They last over resets, until changed.
     #[pyo3(signature = (*, mass = None, friction = None, strength = None, gravity = None, mask = None))]
     fn vary(
-        &mut self,
+        slf: &Bound<'_, Self>,
         mass: Option<&Bound<'_, PyAny>>,
         friction: Option<&Bound<'_, PyAny>>,
         strength: Option<&Bound<'_, PyAny>>,
         gravity: Option<&Bound<'_, PyAny>>,
         mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let none = Variation::none(&self.model.get().inner);
-        let each = Constants { mass, friction, strength, gravity, mask }.read(&none, self.num_envs)?;
-        self.read.clear();
+        let this = &mut *exclusive(slf)?;
+        let none = Variation::none(&this.model.get().inner);
+        let each = Constants { mass, friction, strength, gravity, mask }.read(&none, this.num_envs)?;
+        this.read.clear();
         for (agent, own) in each {
-            self.batch().vary(agent, &own);
+            this.batch().vary(agent, &own);
         }
         Ok(())
     }
@@ -193,12 +201,13 @@ impl Simulation {
     /// a new array. The first row has the smallest y.
     #[pyo3(signature = (field = 0))]
     fn ground<'py>(
-        &mut self,
+        slf: &Bound<'_, Self>,
         py: Python<'py>,
         #[pyo3(from_py_with = number::field)] field: usize,
     ) -> PyResult<Bound<'py, PyArray3<f32>>> {
-        let (n, grid) = (self.num_envs, self.model.get().grid(field)?);
-        let batch = self.batch();
+        let this = &mut *exclusive(slf)?;
+        let (n, grid) = (this.num_envs, this.model.get().grid(field)?);
+        let batch = this.batch();
         let elevations = (0..n).flat_map(|agent| batch.ground(agent, field)).collect();
         grounds_array(py, n, grid, elevations)
     }
@@ -208,15 +217,16 @@ impl Simulation {
     /// over resets, until changed, and belongs to snapshots.
     #[pyo3(signature = (elevations, field = 0, mask = None))]
     fn set_ground(
-        &mut self,
+        slf: &Bound<'_, Self>,
         elevations: &Bound<'_, PyAny>,
         #[pyo3(from_py_with = number::field)] field: usize,
         mask: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let grounds = Grounds::read(self.model.get().grid(field)?, self.num_envs, elevations, mask)?;
-        self.read.clear();
+        let this = &mut *exclusive(slf)?;
+        let grounds = Grounds::read(this.model.get().grid(field)?, this.num_envs, elevations, mask)?;
+        this.read.clear();
         for (agent, elevations) in grounds.each() {
-            self.batch().set_ground(agent, field, elevations);
+            this.batch().set_ground(agent, field, elevations);
         }
         Ok(())
     }
@@ -225,28 +235,30 @@ impl Simulation {
     /// with ground of each agent's own. `x` and `y`, m, are `(num_envs, n)`. Beyond all ground, the height is that of the
     /// nearest place; 0 if the model has no ground.
     fn ground_height<'py>(
-        &mut self,
+        slf: &Bound<'_, Self>,
         py: Python<'py>,
         x: &Bound<'py, PyAny>,
         y: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let this = &mut *exclusive(slf)?;
         let shape: Vec<usize> = py.import("numpy")?.call_method1("shape", (x,))?.extract()?;
         let n = if shape.len() == 2 { shape[1] } else { 1 };
-        let x = of_shape::<f64, Ix2, 2>("x has", x, [self.num_envs, n])?;
-        let y = of_shape::<f64, Ix2, 2>("y has", y, [self.num_envs, n])?;
+        let x = of_shape::<f64, Ix2, 2>("x has", x, [this.num_envs, n])?;
+        let y = of_shape::<f64, Ix2, 2>("y has", y, [this.num_envs, n])?;
         let places: Vec<[f64; 2]> = rows(&x).iter().zip(rows(&y).iter()).map(|(x, y)| [*x, *y]).collect();
-        let heights = PyArray2::<f64>::zeros(py, [self.num_envs, n], false);
+        let heights = PyArray2::<f64>::zeros(py, [this.num_envs, n], false);
         let mut writer = heights.try_readwrite().map_err(|e| error::array("heights", e))?;
-        let (rows, batch) = (writer.as_slice_mut()?, self.batch());
+        let (rows, batch) = (writer.as_slice_mut()?, this.batch());
         py.detach(|| batch.ground_height(&places, rows));
         drop(writer);
         Ok(heights)
     }
 
     /// Everything that the future depends on, as JSON. Loaded, the simulation continues with the same bits.
-    fn save<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let n = self.num_envs;
-        let batch = self.batch();
+    fn save<'py>(slf: &Bound<'_, Self>, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let this = &mut *exclusive(slf)?;
+        let n = this.num_envs;
+        let batch = this.batch();
         let json = py.detach(move || {
             let states: Vec<AgentState> = (0..n).map(|i| batch.agent_state(i)).collect();
             serde_json::to_vec(&states)
@@ -255,105 +267,107 @@ impl Simulation {
     }
 
     /// Restores what `save` returned for the same model and number of agents.
-    fn load(&mut self, snapshot: &[u8]) -> PyResult<()> {
+    fn load(slf: &Bound<'_, Self>, snapshot: &[u8]) -> PyResult<()> {
+        let this = &mut *exclusive(slf)?;
         let states: Vec<AgentState> =
             serde_json::from_slice(snapshot).map_err(|e| error::value(format!("snapshot: {e}")))?;
-        if states.len() != self.num_envs {
-            let (found, expected) = (states.len(), self.num_envs);
+        if states.len() != this.num_envs {
+            let (found, expected) = (states.len(), this.num_envs);
             return Err(error::value(format!("the snapshot has {found} agents, expected {expected}")));
         }
-        if let Some(i) = states.iter().position(|state| !state.fits(&self.model.get().inner)) {
+        if let Some(i) = states.iter().position(|state| !state.fits(&this.model.get().inner)) {
             return Err(error::value(format!(
                 "the snapshot's agent {i} is not of model '{}'",
-                self.model.get().inner.name
+                this.model.get().inner.name
             )));
         }
-        self.read.clear();
+        this.read.clear();
         for (i, state) in states.iter().enumerate() {
-            self.batch().set_agent_state(i, state);
+            this.batch().set_agent_state(i, state);
         }
         Ok(())
     }
 
     /// Configuration, `(num_envs, nq)`.
     #[getter]
-    fn qpos(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.reading(py, Quantity::Qpos)
+    fn qpos(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        exclusive(slf)?.reading(py, Quantity::Qpos)
     }
 
     /// Velocity, `(num_envs, nv)`.
     #[getter]
-    fn qvel(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.reading(py, Quantity::Qvel)
+    fn qvel(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        exclusive(slf)?.reading(py, Quantity::Qvel)
     }
 
     /// Origins of the bodies' frames, m, `(num_envs, nbody, 3)`.
     #[getter]
-    fn body_pos(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.reading(py, Quantity::BodyPos)
+    fn body_pos(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        exclusive(slf)?.reading(py, Quantity::BodyPos)
     }
 
     /// Directions of the bodies' x, y and z axes, `(num_envs, nbody, 3, 3)`: `[..., 0, :]` is that of x.
     #[getter]
-    fn body_axes(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.reading(py, Quantity::BodyAxes)
+    fn body_axes(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        exclusive(slf)?.reading(py, Quantity::BodyAxes)
     }
 
     /// Velocities of the origins of the bodies' frames, m/s, `(num_envs, nbody, 3)`.
     #[getter]
-    fn body_velocity(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.reading(py, Quantity::BodyVelocity)
+    fn body_velocity(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        exclusive(slf)?.reading(py, Quantity::BodyVelocity)
     }
 
     /// Angular velocities of the bodies, rad/s, `(num_envs, nbody, 3)`.
     #[getter]
-    fn body_angular_velocity(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.reading(py, Quantity::BodyAngularVelocity)
+    fn body_angular_velocity(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        exclusive(slf)?.reading(py, Quantity::BodyAngularVelocity)
     }
 
     /// Centers of the geoms, m, `(num_envs, ngeom, 3)`.
     #[getter]
-    fn geom_pos(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.reading(py, Quantity::GeomPos)
+    fn geom_pos(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        exclusive(slf)?.reading(py, Quantity::GeomPos)
     }
 
     /// Velocities of the geoms' centers, m/s, `(num_envs, ngeom, 3)`.
     #[getter]
-    fn geom_velocity(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.reading(py, Quantity::GeomVelocity)
+    fn geom_velocity(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        exclusive(slf)?.reading(py, Quantity::GeomVelocity)
     }
 
     /// Geoms that touched the static world at the last physics step, `(num_envs, ngeom)`, bool.
     #[getter]
-    fn touching(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.reading(py, Quantity::Touching)
+    fn touching(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        exclusive(slf)?.reading(py, Quantity::Touching)
     }
 
     /// Geoms that touched the static world at any physics step of the last `step`, `(num_envs, ngeom)`, bool.
     #[getter]
-    fn touched(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.reading(py, Quantity::Touched)
+    fn touched(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        exclusive(slf)?.reading(py, Quantity::Touched)
     }
 
     /// Normal forces of the geoms' contacts with the static world at the last physics step, N, `(num_envs, ngeom)`.
     #[getter]
-    fn normal_force(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.reading(py, Quantity::NormalForce)
+    fn normal_force(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        exclusive(slf)?.reading(py, Quantity::NormalForce)
     }
 
     /// Sensors' values at the present state and controls, in the model's order, `(num_envs, ...)`; NaN for those that
     /// cannot be evaluated. This costs about as much as a physics step.
     #[getter]
-    fn sensors(&mut self, py: Python<'_>) -> PyResult<Py<PyAny>> {
-        self.reading(py, Quantity::Sensors)
+    fn sensors(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        exclusive(slf)?.reading(py, Quantity::Sensors)
     }
 
-    fn __len__(&self) -> usize {
-        self.num_envs
+    fn __len__(slf: &Bound<'_, Self>) -> PyResult<usize> {
+        Ok(shared(slf)?.num_envs)
     }
 
-    fn __repr__(&self) -> String {
-        format!("Simulation({:?}, num_envs={})", self.model.get().inner.name, self.num_envs)
+    fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
+        let this = &*shared(slf)?;
+        Ok(format!("Simulation({:?}, num_envs={})", this.model.get().inner.name, this.num_envs))
     }
 }
 

@@ -151,7 +151,7 @@ type Arguments<'py> = (String, Bound<'py, PyDict>, usize);
 
 /// Facts of a task with a limit of its own.
 #[pyfunction]
-pub fn _spec(id: &str, options: &Bound<'_, PyDict>, max_episode_steps: usize) -> PyResult<Spec> {
+pub fn _spec(id: String, options: &Bound<'_, PyDict>, max_episode_steps: usize) -> PyResult<Spec> {
     Ok(Spec { max_episode_steps, ..spec(id, Some(options))? })
 }
 
@@ -161,11 +161,19 @@ pub fn ids() -> Vec<String> {
     registry::ids()
 }
 
+/// Steps after which each task truncates its episodes, by name. No task is made ready to be simulated.
+#[pyfunction]
+pub fn _limits() -> PyResult<Vec<(String, usize)>> {
+    let registry = registry::global();
+    let limit = |id: String| Ok((id.clone(), registry.agent(&id)?.facts().max_episode_steps));
+    registry.ids().into_iter().map(limit).collect::<Result<_, _>>().map_err(error::env)
+}
+
 /// Facts of a task, by any of its names, with other values for some of its arguments.
 #[pyfunction]
 #[pyo3(signature = (id, /, **options))]
-pub fn spec(id: &str, options: Option<&Bound<'_, PyDict>>) -> PyResult<Spec> {
-    let id = task::plain(id);
+pub fn spec(#[pyo3(from_py_with = task::name)] id: String, options: Option<&Bound<'_, PyDict>>) -> PyResult<Spec> {
+    let id = task::plain(&id);
     Spec::of(options::set(id, options)?.factory_on(Isa::F32).map_err(error::run)?.spec())
 }
 

@@ -6,18 +6,49 @@ use marathon_physics::lanes::Isa;
 use marathon_runs::RunError;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyType};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// A task as an argument.
-#[derive(FromPyObject)]
 pub enum Task {
-    /// One of the registry.
-    #[pyo3(transparent)]
+    /// One of the registry, or the path of a model.
     Name(String),
     /// A `MarathonAgent`, class or object. An object stands for its class.
-    #[pyo3(transparent)]
     Agent(Py<PyAny>),
+}
+
+/// Reads an argument that may be missing.
+pub fn optional(value: &Bound<'_, PyAny>) -> PyResult<Option<Task>> {
+    if value.is_none() {
+        return Ok(None);
+    }
+    if let Some(name) = text(value)? {
+        return Ok(Some(Task::Name(name)));
+    }
+    check(value)?;
+    Ok(Some(Task::Agent(value.clone().unbind())))
+}
+
+/// Reads an argument that is the name of a task or the path of a model.
+pub fn name(value: &Bound<'_, PyAny>) -> PyResult<String> {
+    let wrong = |found| {
+        let expected = "expected a task's name or the path of a model";
+        PyTypeError::new_err(format!("task is of type {found}, {expected}"))
+    };
+    text(value)?.ok_or_else(|| value.get_type().name().map_or_else(|error| error, wrong))
+}
+
+/// A text, or a path as a text.
+fn text(value: &Bound<'_, PyAny>) -> PyResult<Option<String>> {
+    if let Ok(text) = value.extract() {
+        return Ok(Some(text));
+    }
+    if value.is_instance_of::<PyType>() || !value.hasattr("__fspath__")? {
+        return Ok(None);
+    }
+    let path = value.extract::<PathBuf>()?.into_os_string();
+    path.into_string().map(Some).map_err(|path| error::value(format!("task is {path:?}, expected a path in UTF-8")))
 }
 
 /// Gymnasium's namespace of the tasks, which may stand before a name.
@@ -58,7 +89,6 @@ impl Task {
             Task::Name(name) => return marathon_runs::Task::named(plain(name)).map_err(error::run),
             Task::Agent(agent) => agent.bind(py),
         };
-        check(agent)?;
         let id: String = agent.call_method0("task_id")?.extract()?;
         let text = id.clone();
         Ok(marathon_runs::Task::made(id, move |agents| match lockstep(agent, agents, threads, options) {
@@ -91,7 +121,6 @@ fn vec_env<'py>(
     threads: usize,
     options: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    check(agent)?;
     let keywords = PyDict::new(agent.py());
     keywords.set_item("threads", threads)?;
     keywords.set_item("autoreset", "same_step")?;
@@ -106,7 +135,8 @@ fn check(agent: &Bound<'_, PyAny>) -> PyResult<()> {
         true => Ok(()),
         false => {
             let found = agent.get_type().name()?;
-            Err(PyTypeError::new_err(format!("task is of type {found}, expected a task's name or a MarathonAgent")))
+            let expected = "expected a task's name, the path of a model or a MarathonAgent";
+            Err(PyTypeError::new_err(format!("task is of type {found}, {expected}")))
         }
     }
 }

@@ -1,11 +1,13 @@
 //! The native trainer, called from Python.
 
+use crate::config::{self, Config};
 use crate::players::PyPlayers;
 use crate::policy::{Policy, json};
 use crate::task::{self, Made, Task};
 use crate::{batch_task, error, number, options as arguments};
-use marathon_envs::Options;
+use marathon_envs::{EnvError, Options, registry};
 use marathon_learn::{Control, Players};
+use marathon_physics::hint::nearest;
 use marathon_runs::report::csv::columns;
 use marathon_runs::{LearnOptions, RunError, RunOptions, Session};
 use pyo3::exceptions::{PyTypeError, PyUserWarning};
@@ -13,27 +15,6 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::ffi::CString;
 use std::path::PathBuf;
-
-/// Where the configuration comes from.
-pub enum Config {
-    /// A file.
-    Path(PathBuf),
-    /// A dictionary with the keys of the files.
-    Table(Py<PyDict>),
-}
-
-fn config(value: &Bound<'_, PyAny>) -> PyResult<Option<Config>> {
-    if value.is_none() {
-        return Ok(None);
-    }
-    if let Ok(table) = value.cast::<PyDict>() {
-        return Ok(Some(Config::Table(table.clone().unbind())));
-    }
-    value.extract().map(|path| Some(Config::Path(path))).map_err(|_| match value.get_type().name() {
-        Ok(found) => PyTypeError::new_err(format!("config is of type {found}, expected a path or a dictionary")),
-        Err(error) => error,
-    })
-}
 
 /// Result of a run.
 #[pyclass(frozen, module = "marathon_rl")]
@@ -67,9 +48,77 @@ impl TrainResult {
         json(py, &self.summary)
     }
 
+    /// For `copy` and `pickle`: the parts.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Parts)> {
+        let make = py.import("marathon_rl._native")?.getattr("_train_result")?;
+        let summary = serde_json::to_string(&self.summary).map_err(error::any)?;
+        Ok((make, (self.policy.clone_ref(py), self.steps, self.interrupted, self.folder.clone(), summary)))
+    }
+
     fn __repr__(&self) -> String {
         format!("TrainResult(steps={}, interrupted={})", self.steps, self.interrupted)
     }
+}
+
+/// Policy, steps, interrupted, folder and summary in JSON.
+type Parts = (Py<Policy>, u64, bool, Option<PathBuf>, String);
+
+/// A result from its parts.
+#[pyfunction]
+pub fn _train_result(
+    policy: Py<Policy>,
+    steps: u64,
+    interrupted: bool,
+    folder: Option<PathBuf>,
+    summary: &str,
+) -> PyResult<TrainResult> {
+    let summary = serde_json::from_str(summary).map_err(error::any)?;
+    Ok(TrainResult { policy, steps, interrupted, folder, summary })
+}
+
+/// Keyword arguments of other trainers and of the command, and those of [`train`] for them.
+const ALIASES: [(&str, &str); 5] = [
+    ("agents", "num_envs"),
+    ("num_agents", "num_envs"),
+    ("n_envs", "num_envs"),
+    ("total_steps", "steps"),
+    ("total_timesteps", "steps"),
+];
+/// Keyword arguments of [`train`].
+const PARAMETERS: [&str; 11] = [
+    "config",
+    "callback",
+    "progress",
+    "seed",
+    "steps",
+    "num_envs",
+    "threads",
+    "out",
+    "resume",
+    "players",
+    "initialize_from",
+];
+
+/// Refuses an option that the task does not take and that is nearly an argument of [`train`].
+fn check_spelling(task: &str, options: &Options) -> PyResult<()> {
+    for (name, value) in options.iter() {
+        let tried = registry::global().agent_with(task, &Options::new().with(name, value.clone()));
+        let Err(EnvError::UnknownOption { nearest: near_option, .. }) = tried.map(|_| ()) else { continue };
+        let alias = ALIASES.iter().find(|(other, _)| *other == name).map(|(_, own)| *own);
+        if let Some(own) = alias.or_else(|| nearest(name, PARAMETERS).filter(|_| near_option.is_none())) {
+            let text = format!("got an unexpected keyword argument '{name}'; did you mean '{own}'?");
+            return Err(PyTypeError::new_err(text));
+        }
+    }
+    Ok(())
+}
+
+fn callback(value: &Bound<'_, PyAny>) -> PyResult<Option<Py<PyAny>>> {
+    if value.is_none() || value.is_callable() {
+        return Ok(Some(value).filter(|value| !value.is_none()).map(|value| value.clone().unbind()));
+    }
+    let found = value.get_type().name()?;
+    Err(PyTypeError::new_err(format!("callback is of type {found}, expected a function")))
 }
 
 /// Trains a policy with the native trainer, without the GIL, and evaluates it.
@@ -95,9 +144,9 @@ impl TrainResult {
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python function")]
 pub fn train(
     py: Python<'_>,
-    task: Option<Task>,
-    #[pyo3(from_py_with = self::config)] config: Option<Config>,
-    callback: Option<Py<PyAny>>,
+    #[pyo3(from_py_with = task::optional)] task: Option<Task>,
+    #[pyo3(from_py_with = config::read)] config: Option<Config>,
+    #[pyo3(from_py_with = self::callback)] callback: Option<Py<PyAny>>,
     progress: bool,
     #[pyo3(from_py_with = number::seed)] seed: Option<u64>,
     #[pyo3(from_py_with = number::steps)] steps: Option<u64>,
@@ -119,7 +168,11 @@ pub fn train(
             }
             Options::new()
         }
-        Some(Task::Name(name)) => arguments::read(task::plain(name), given)?,
+        Some(Task::Name(name)) => {
+            let options = arguments::read(task::plain(name), given)?;
+            check_spelling(task::plain(name), &options)?;
+            options
+        }
         // a class takes them itself
         _ => Options::new(),
     };
@@ -142,7 +195,7 @@ pub fn train(
             return Err(error::run(RunError::NewRunOnly { name: "config" }));
         }
         Some(Config::Table(table)) => {
-            let text: String = py.import("json")?.call_method1("dumps", (table,))?.extract()?;
+            let text = config::json(table.bind(py))?;
             let parse = |id: &str| marathon_config::parse_object("config", &text, id);
             loaded = task.as_ref().map(|task| parse(task.id())).transpose().map_err(error::any)?;
         }
