@@ -3,14 +3,15 @@
 import gymnasium
 from gymnasium.envs.registration import registry
 
-from marathon_rl._native import ids, spec
+from marathon_rl._native import _limits
 
 NAMESPACE = "marathon_rl"
 
 
 def register() -> None:
     """Register every task as `marathon_rl/<id>`, for `gymnasium.make` and `gymnasium.make_vec`."""
-    for task in ids():
+    # no model is compiled here: an import is quick, and an error of a model belongs to its task
+    for task, max_episode_steps in _limits():
         name = f"{NAMESPACE}/{task}"
         if name in registry:
             continue
@@ -18,7 +19,7 @@ def register() -> None:
             id=name,
             entry_point="marathon_rl.env:MarathonEnv",
             vector_entry_point="marathon_rl.vector:MarathonVectorEnv",
-            max_episode_steps=spec(task).max_episode_steps,
+            max_episode_steps=max_episode_steps,
             kwargs={"task": task},
         )
         # versions are different tasks here, not older and newer ones: Gymnasium must not call any of them outdated
