@@ -42,10 +42,10 @@ def program() -> str:
 
 def _about(task: Task, dt: float, options: dict[str, Any]) -> dict[str, Any]:
     """Return the description of a task for the game: its name, its model file, or the model of a class."""
-    if isinstance(task, str):
+    if isinstance(task, str | os.PathLike):
         file = Path(options.get("xml_file") or task)
         is_model = file.suffix.lower() == ".xml" and file.is_file()
-        return {"file": str(file.resolve()), "dt": dt} if is_model else {"agent": task}
+        return {"file": str(file.resolve()), "dt": dt} if is_model else {"agent": os.fsdecode(task)}
     source = os.fspath(task.mjcf)
     if source.lstrip().startswith("<"):
         return {"model": source, "dt": dt}

@@ -87,9 +87,9 @@ class MarathonAgent:
 
     def __init__(self, num_envs: int = 1, *, threads: int = 0, isa: Any = None) -> None:
         """Load the model and put all agents into the spawn pose. `threads` and `isa` are those of `Simulation`."""
-        self.num_envs = num_envs
         self.model = self.load_model()
         self.sim = Simulation(self.model, num_envs, threads=threads, isa=isa)
+        self.num_envs = num_envs = self.sim.num_envs
         self.action: FloatArray = np.zeros((num_envs, self.model.nu))
         """Actions of the last decision, as `controls` says, `(N, nu)`; zero at the start of an episode."""
         self.memory: FloatArray = np.zeros((num_envs, self.memory_size))

@@ -122,7 +122,7 @@ def test_any_function_can_be_evaluated() -> None:
     assert (broken["diverged"], broken["falls"], broken["length_mean"], broken["return_mean"]) == (4, 4, 1, 0)
     for wrong, message in [
         (lambda: evaluate(lambda obs: obs), "task is missing"),
-        (lambda: evaluate("policy", task="hopper"), "policy is of type str, expected a Policy or a function"),
+        (lambda: evaluate(3, task="hopper"), "policy is of type int, expected a Policy, a path or a function"),
     ]:
         with pytest.raises(TypeError, match=message):
             wrong()
@@ -169,7 +169,7 @@ def test_what_is_wrong_is_said() -> None:
         train(resume="runs/hopper-1", stepps=1)
     with pytest.raises(TypeError, match="unexpected keyword argument 'agents'"):
         train("hopper", agents=16)
-    with pytest.raises(ValueError, match="no such file"):
+    with pytest.raises(FileNotFoundError, match="no such file"):
         load_policy("nowhere.safetensors")
 
 

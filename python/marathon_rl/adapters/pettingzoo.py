@@ -34,10 +34,11 @@ class MarathonParallelEnv(ParallelEnv[str, FloatArray, FloatArray]):
     ) -> None:
         """Make an environment; the arguments are those of `MarathonVectorEnv`."""
         limit = _spaces.steps_limit(max_episode_steps, None)
+        _native._check_size(width, height)
         self._env = _tasks.vec_env(
             task, num_envs, threads=threads, autoreset="disabled", max_episode_steps=limit, copy=True, **options
         )
-        self.task_spec = self._env.spec
+        self.task_spec, num_envs = self._env.spec, self._env.num_envs
         self.metadata = {
             "name": self.task_spec.id.lower().replace("-", "_"),
             "render_modes": ["rgb_array"],

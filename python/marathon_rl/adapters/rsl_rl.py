@@ -53,7 +53,7 @@ class RslRlEnv(VecEnv):
             **options,
         )
         self.task_spec = self._env.spec
-        self.num_envs = num_envs
+        self.num_envs = num_envs = self._env.num_envs
         self.num_actions = self.task_spec.act_size
         self.max_episode_length = max_episode_steps or _tasks.max_episode_steps(task, **options)
         self.episode_length_buf = torch.zeros(num_envs, dtype=torch.long, device=device)

@@ -39,6 +39,8 @@ class Sb3VecEnv(VecEnv):
         """Make an environment; the arguments are those of `MarathonVectorEnv`."""
         _spaces.check_render_mode(render_mode, {"render_modes": ["rgb_array"]})
         limit = _spaces.steps_limit(max_episode_steps, None)
+        _native._check_size(width, height)
+        task = _tasks.known(task)
         self._env = _tasks.vec_env(
             task,
             num_envs,
@@ -49,7 +51,7 @@ class Sb3VecEnv(VecEnv):
             dtype=_tasks.dtype(task),
             **options,
         )
-        self.task_spec = self._env.spec
+        self.task_spec, num_envs = self._env.spec, self._env.num_envs
         self.spec = gymnasium.registry.get(f"{NAMESPACE}/{self.task_spec.id}") if isinstance(task, str) else None
         self._info, self._add_x = _spaces.info_names(self.task_spec)
         self._x: FloatArray | None = None
