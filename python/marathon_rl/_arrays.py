@@ -1,10 +1,21 @@
 """Types of arrays, and random numbers for many agents at once."""
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
+
+
+def real_numbers(name: str, values: npt.ArrayLike, dtype: npt.DTypeLike) -> npt.NDArray[Any]:
+    """Return values as an array of a type of numbers; NumPy would drop the imaginary parts of complex ones."""
+    array = np.asarray(values)
+    if array.dtype.kind not in "biuf":
+        raise TypeError(f"{name} have the type {array.dtype}, expected real numbers")
+    return array.astype(dtype, copy=False)
+
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 

@@ -1,13 +1,13 @@
 """Spaces of a task, and what else one agent and many have in common."""
 
-from typing import Any
+from typing import Any, cast
 
 import gymnasium
 import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 
-from marathon_rl._native import Spec
+from marathon_rl._native import Spec, _seeds
 from marathon_rl.agent_env import AgentSpec
 
 FloatArray = npt.NDArray[Any]
@@ -51,8 +51,10 @@ def warn_of_divergence(actions: Any) -> None:
 
 
 def native_seed(seed: Any) -> int:
-    """Turn a seed of Gymnasium's, which may be of any size, into one of 64 bits."""
-    return int(seed) % 2**64
+    """Check the seed of one agent."""
+    # as one of many, so that an error does not offer a sequence
+    (checked,) = cast("list[int]", _seeds([seed]))
+    return checked
 
 
 def steps_limit(max_episode_steps: int | None, default: int | None) -> int | None:

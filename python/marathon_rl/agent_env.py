@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from marathon_rl import _snapshots
-from marathon_rl._arrays import BoolArray, FloatArray, Streams
-from marathon_rl._native import CommandRange, Model, Viewer
+from marathon_rl._arrays import BoolArray, FloatArray, Streams, real_numbers
+from marathon_rl._native import CommandRange, Model, Viewer, _count, _mask, _seeds
 from marathon_rl.agents import MarathonAgent
 
 LARGEST = 1e6
@@ -78,6 +78,7 @@ class AgentVecEnv:
 
         Arrays are new at every step, whatever `copy` says.
         """
+        num_envs = _count("num_envs", num_envs)
         self._made = {
             "agent": agent,
             "num_envs": num_envs,
@@ -91,7 +92,8 @@ class AgentVecEnv:
         mode = _AUTORESET.get(autoreset.replace("_", "").lower())
         if mode is None:
             raise ValueError(f"autoreset is '{autoreset}', expected one of 'next_step', 'same_step', 'disabled'")
-        limit = agent.max_episode_steps if max_episode_steps is None else max_episode_steps
+        given = max_episode_steps
+        limit = agent.max_episode_steps if given is None else _count("max_episode_steps", given, limited=False)
         for name, number in (("max_episode_steps", limit), ("frame_skip", agent.frame_skip), ("num_envs", num_envs)):
             if number < 1:
                 raise ValueError(f"{name} is {number}, expected at least 1")
@@ -102,7 +104,7 @@ class AgentVecEnv:
         self._id = agent.task_id()
         self._terms: list[str] | None = None
         self.memory = self.agent.memory
-        self.seeds = np.full(num_envs, seed, np.uint64)
+        self.seeds = np.full(num_envs, _seeds(seed), np.uint64)
         self.numbers = np.arange(num_envs, dtype=np.uint64)
         self.episodes = np.zeros(num_envs, np.uint64)
         self.steps = np.zeros(num_envs, np.int64)
@@ -300,20 +302,20 @@ class AgentVecEnv:
             self.commanded[chosen] = False
             return
         # a copy: ends of ranges in single precision become the exact ends
-        numbers, expected = np.array(command, float), self.given.shape
-        if numbers.shape != expected:
-            raise ValueError(f"command has the shape {numbers.shape}, expected {expected}")
+        told, expected = np.array(command, float), self.given.shape
+        if told.shape != expected:
+            raise ValueError(f"command has the shape {told.shape}, expected {expected}")
         for i, number in enumerate(ranges):
             for end, beyond in ((number.low, np.less), (number.high, np.greater)):
-                numbers[beyond(numbers[:, i], end) & (np.float32(numbers[:, i]) == np.float32(end)), i] = end
+                told[beyond(told[:, i], end) & (np.float32(told[:, i]) == np.float32(end)), i] = end
             # NaN is in no range
-            wrong = chosen & ~((numbers[:, i] >= number.low) & (numbers[:, i] <= number.high))
+            wrong = chosen & ~((told[:, i] >= number.low) & (told[:, i] <= number.high))
             if wrong.any():
                 agent = int(wrong.argmax())
-                found = f"command {number.name} is {numbers[agent, i]}"
+                found = f"command {number.name} is {told[agent, i]}"
                 expects = f"expected {number.low:g} to {number.high:g} {number.unit}"
                 raise ValueError(f"agent {agent} of '{self._id}': {found}, {expects}")
-        self.given[chosen], self.commanded[chosen] = numbers[chosen], True
+        self.given[chosen], self.commanded[chosen] = told[chosen], True
 
     @property
     def command(self) -> FloatArray:
@@ -357,17 +359,18 @@ class AgentVecEnv:
         chosen = self._mask(mask)
         if not self._ready and not chosen.all():
             raise ValueError("the first reset must be of all agents; mask has some that are False")
-        if seed is not None:
-            if isinstance(seed, (int, np.integer)):
-                seeds: Sequence[int | None] = [int(seed)] * self.num_envs
-                numbers = np.arange(self.num_envs, dtype=np.uint64)
+        native = _seeds(seed)
+        if native is not None:
+            if isinstance(native, int):
+                seeds: list[int | None] = [native] * self.num_envs
+                streams = np.arange(self.num_envs, dtype=np.uint64)
             else:
-                seeds, numbers = seed, np.zeros(self.num_envs, np.uint64)
+                seeds, streams = native, np.zeros(self.num_envs, np.uint64)
             if len(seeds) != self.num_envs:
                 raise ValueError(f"seed has {len(seeds)} numbers, expected {self.num_envs}")
             given = chosen & np.array([one is not None for one in seeds])
             self.seeds[given] = np.array([one or 0 for one in seeds], np.uint64)[given]
-            self.numbers[given] = numbers[given]
+            self.numbers[given] = streams[given]
             self.episodes[given] = 0
         self._begin(chosen)
         return self._show(chosen)
@@ -394,7 +397,7 @@ class AgentVecEnv:
         """Advance every agent by one decision, as `VecEnv.step`."""
         if not self._ready:
             raise ValueError("reset must be called before the first step")
-        agent, given = self.agent, np.asarray(actions, np.float32)
+        agent, given = self.agent, real_numbers("actions", actions, np.float32)
         expected = (self.num_envs, self.spec.act_size)
         if given.shape != expected:
             raise ValueError(f"actions have the shape {given.shape}, expected {expected}")
@@ -477,10 +480,7 @@ class AgentVecEnv:
         return self._show(chosen)
 
     def _mask(self, mask: npt.ArrayLike | None) -> BoolArray:
-        chosen = np.ones(self.num_envs, np.bool_) if mask is None else np.asarray(mask, np.bool_)
-        if chosen.shape != (self.num_envs,):
-            raise ValueError(f"mask has the shape {chosen.shape}, expected ({self.num_envs},)")
-        return chosen
+        return np.ones(self.num_envs, np.bool_) if mask is None else _mask(mask, self.num_envs)
 
     def show(self, *, port: int = 0, page: str | PathLike[str] | None = None) -> Viewer:
         """Raise an error: the viewer takes tasks that Marathon has itself, no Python classes."""
@@ -488,7 +488,7 @@ class AgentVecEnv:
 
     def save(self) -> bytes:
         """Everything that the future depends on: NumPy's `.npz`, without pickles."""
-        return _snapshots.pack(self.agent.sim.save(), self._arrays())
+        return _snapshots.pack(self._id, self.agent.sim.save(), self._arrays())
 
     def _arrays(self) -> dict[str, npt.NDArray[Any]]:
         """Return the contents of a snapshot besides the physics, with commands if there are any."""

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from marathon_rl import _snapshots, _spaces, _tasks, _window
-from marathon_rl._native import Renderer, Viewer
+from marathon_rl._native import Renderer, Viewer, _check_size
 from marathon_rl._spaces import FloatArray
 from marathon_rl._tasks import Task
 
@@ -57,7 +57,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         """Make an environment.
 
         Args:
-            task: name of the task, as in `marathon_rl.ids()`, or a `MarathonAgent` class.
+            task: name of the task, as in `marathon_rl.ids()`, the path of a model, or a `MarathonAgent` class.
             render_mode: None; "rgb_array" for pictures of `width` x `height` pixels; or "human" for a window of the
                 game, with which steps take the time that they simulate. The program `marathon-game` is looked up on
                 the search path, or where the environment variable MARATHON_GAME says; if it is not there,
@@ -71,6 +71,8 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
             **options: arguments of the task, see `marathon_rl.spec(task).options`.
         """
         _spaces.check_render_mode(render_mode, {"render_modes": ["rgb_array", "human"]})
+        _check_size(width, height)
+        task = _tasks.known(task)
         limit = _spaces.steps_limit(max_episode_steps, _spaces.NEVER)
         self._env = _tasks.vec_env(
             task, 1, threads=1, isa=isa, autoreset="disabled", max_episode_steps=limit, copy=True, **options
@@ -101,11 +103,12 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[FloatArray, dict[str, Any]]:
         """Start an episode. A seed gives the episodes of agent 0 of a native environment with that seed."""
+        seed = None if seed is None else _spaces.native_seed(seed)
         super().reset(seed=seed)
         if seed is None and not self._seeded:
             seed = int(self.np_random.integers(2**63))
         self._seeded = True
-        obs = self._env.reset(None if seed is None else _spaces.native_seed(seed))
+        obs = self._env.reset(seed)
         # far from the last picture, so that the camera jumps to the start
         self._seconds += 2.0
         if self._window is not None:
@@ -115,7 +118,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
     def step(self, action: FloatArray) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Make one decision. An episode that has ended goes on until `reset`."""
         env = self._env
-        obs, reward, terminated, truncated = env.step(np.asarray(action, np.float32)[None])
+        obs, reward, terminated, truncated = env.step(np.asarray(action)[None])
         self._seconds += self.dt
         if self._window is not None:
             self._window.show(env.get_state()[0][0], begins=False, reward=float(reward[0]))
@@ -147,7 +150,7 @@ class MarathonEnv(gymnasium.Env[FloatArray, FloatArray]):
         """Everything that the episodes to come depend on; of wrappers, such as time limits, nothing."""
         if not self._seeded:
             raise gymnasium.error.ResetNeeded("reset must be called before save")
-        return _snapshots.pack(self._env.save(), {"obs": self._env.obs})
+        return _snapshots.pack(self.task_spec.id, self._env.save(), {"obs": self._env.obs})
 
     def load(self, snapshot: bytes) -> FloatArray:
         """Go on where an environment of the same task was saved; returns the observation to act upon."""

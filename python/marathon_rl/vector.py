@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from marathon_rl import _snapshots, _spaces, _tasks
-from marathon_rl._native import Model, Renderer, Viewer
+from marathon_rl._native import Model, Renderer, Viewer, _check_size, _mask, _seeds
 from marathon_rl._spaces import BoolArray, FloatArray
 from marathon_rl._tasks import Task
 
@@ -63,7 +63,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         """Make an environment.
 
         Args:
-            task: name of the task, as in `marathon_rl.ids()`, or a `MarathonAgent` class.
+            task: name of the task, as in `marathon_rl.ids()`, the path of a model, or a `MarathonAgent` class.
             num_envs: number of agents.
             autoreset_mode: handling of agents whose episode ended.
             render_mode: None, or "rgb_array" for pictures of `width` x `height` pixels, one for each agent.
@@ -79,6 +79,8 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
             **options: arguments of the task, see `marathon_rl.spec(task).options`.
         """
         _spaces.check_render_mode(render_mode, self.metadata)
+        _check_size(width, height)
+        task = _tasks.known(task)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self._env = _tasks.vec_env(
             task,
@@ -92,7 +94,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
             **options,
         )
         self.task_spec = self._env.spec
-        self.num_envs = num_envs
+        self.num_envs = num_envs = self._env.num_envs
         self.render_mode = render_mode
         self.metadata = {
             **self.metadata,
@@ -122,17 +124,12 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[FloatArray, Infos]:
         """Start episodes of all agents, or of those in `options["reset_mask"]`, a boolean array `(num_envs,)`."""
-        mask = self._reset_mask(options)
-        if seed is None and not self._seeded:
-            seed = int(self.np_random.integers(2**63))
-        elif isinstance(seed, (int, np.integer)):
-            super().reset(seed=int(seed))
+        mask, native = self._reset_mask(options), _seeds(seed)
+        if native is None and not self._seeded:
+            native = int(self.np_random.integers(2**63))
+        elif isinstance(native, int):
+            super().reset(seed=native)
         self._seeded = True
-        native: int | list[int | None] | None
-        if seed is None or isinstance(seed, (int, np.integer)):
-            native = None if seed is None else _spaces.native_seed(seed)
-        else:
-            native = [None if s is None else _spaces.native_seed(s) for s in seed]
         obs = self._env.reset(native, mask)
         begun = np.ones(self.num_envs, np.bool_) if mask is None else mask.copy()
         self._ended &= ~begun
@@ -143,10 +140,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
     def _reset_mask(self, options: dict[str, Any] | None) -> BoolArray | None:
         if options is None or "reset_mask" not in options:
             return None
-        mask = options["reset_mask"]
-        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
-            found = f"{mask.dtype} {mask.shape}" if isinstance(mask, np.ndarray) else type(mask).__name__
-            raise ValueError(f"reset_mask is {found}, expected a boolean array of shape ({self.num_envs},)")
+        mask = _mask(options["reset_mask"], self.num_envs, "reset_mask")
         if not mask.any():
             raise ValueError("reset_mask chooses no agent, expected at least one")
         return mask
@@ -281,7 +275,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
         """Everything that the episodes to come depend on; of wrappers, nothing."""
         if not self._seeded:
             raise gymnasium.error.ResetNeeded("reset must be called before save")
-        return _snapshots.pack(self._env.save(), {"obs": self._env.obs, "ended": self._ended})
+        return _snapshots.pack(self.task_spec.id, self._env.save(), {"obs": self._env.obs, "ended": self._ended})
 
     def load(self, snapshot: bytes) -> FloatArray:
         """Go on where an environment of the same task and number of agents was saved; returns the observations."""
@@ -304,7 +298,7 @@ class MarathonVectorEnv(VectorEnv[FloatArray, FloatArray, FloatArray]):
     def set_state(self, qpos: FloatArray, qvel: FloatArray, mask: BoolArray | None = None) -> FloatArray:
         """Begin episodes of all agents, or of those in a mask, in states; returns the observations."""
         obs = self._env.set_state(qpos, qvel, mask)
-        self._ended &= False if mask is None else ~np.asarray(mask)
+        self._ended &= False if mask is None else ~_mask(mask, self.num_envs)
         self._x = self._env.x_position if self._add_x else None
         return self._observed(obs)
 
