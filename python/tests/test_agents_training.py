@@ -153,8 +153,8 @@ def test_what_goes_wrong_in_python_is_what_is_raised(tmp_path: Path) -> None:
         evaluate(load_policy(tmp_path / "policy.safetensors"), 2, task=type("Arm", (Tired,), {}))
     with pytest.raises(ValueError, match=r"nowhere\.xml"):
         train(Headless)
-    for wrong in (5, object):
-        with pytest.raises(TypeError, match="expected a task's name or a MarathonAgent"):
+    for wrong, found in ((5, "of type int"), (object, "the class object")):
+        with pytest.raises(TypeError, match=f"task is {found}, expected a task's name, .* or a MarathonAgent"):
             train(wrong)
     with pytest.raises(ValueError, match="Leg"):
         train(Leg, {"behaviors": {"Arm": {"max_steps": 1}}})

@@ -134,9 +134,12 @@ fn check(agent: &Bound<'_, PyAny>) -> PyResult<()> {
     match agent.hasattr("vec_env")? && agent.hasattr("task_id")? {
         true => Ok(()),
         false => {
-            let found = agent.get_type().name()?;
+            let found = match agent.cast::<PyType>() {
+                Ok(class) => format!("the class {}", class.name()?),
+                Err(_) => format!("of type {}", agent.get_type().name()?),
+            };
             let expected = "expected a task's name, the path of a model or a MarathonAgent";
-            Err(PyTypeError::new_err(format!("task is of type {found}, {expected}")))
+            Err(PyTypeError::new_err(format!("task is {found}, {expected}")))
         }
     }
 }
