@@ -18,6 +18,7 @@ use args::{Args, Command};
 use clap::Parser;
 use clap::error::{ContextKind, ContextValue};
 use error::CliError;
+use marathon_physics::budget;
 use marathon_physics::lanes::Isa;
 use marathon_runs::terminal;
 use std::ffi::OsString;
@@ -72,6 +73,8 @@ fn dispatch(args: &Args) -> Result<(), CliError> {
         Command::Serve(serve) => commands::serve::run(serve, args.json),
         Command::List { agent } => commands::list::run(agent.as_deref(), args.json),
         Command::Bench(bench) => bench::run(bench, args.json),
+    // any limit reads the whole variable
+    budget::MEMORY.most().map_err(|error| CliError::Usage(error.to_string()))?;
         Command::Config(command) => commands::config::run(command, args.json),
         Command::RolloutWorker => commands::rollout_worker::run(),
         Command::Motion(what) => motion::run(what, args.json),

@@ -3,7 +3,7 @@
 //! The parser's events are put together here, not by a library's loader, because a file may be anything: nesting and
 //! aliases are bounded, so that no file exhausts the stack or the memory.
 
-use super::error::{ConfigError, shown};
+use super::error::{ConfigError, printable, shown};
 use marathon_physics::budget::CONFIG_FILE;
 use saphyr_parser::{Event, Parser, ScalarStyle, Span, Tag};
 use std::borrow::Cow;
@@ -111,13 +111,21 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Map, ConfigError> {
         let line = 1 + bytes[..e.valid_up_to()].iter().filter(|b| **b == b'\n').count();
         ConfigError::syntax(path, line, 1, "found bytes that are no text, expected UTF-8")
     })?;
+    parse_text(path, text)
+}
+
+/// The same for a text of the program itself, which has no limit.
+///
+/// # Errors
+/// As [`parse`].
+pub fn parse_text(path: &Path, text: &str) -> Result<Map, ConfigError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut builder = Builder { path, open: Vec::new(), anchors: BTreeMap::new(), nodes: 0, repeated: 0, root: None };
     let mut parser = Parser::new_from_str(text);
     while let Some(event) = parser.next_event() {
         let (event, span) = event.map_err(|e| {
             let at = e.marker();
-            ConfigError::syntax(path, at.line(), at.col() + 1, format!("not YAML: {}", shown(e.info())))
+            ConfigError::syntax(path, at.line(), at.col() + 1, format!("not YAML: {}", printable(e.info())))
         })?;
         builder.event(event, span)?;
     }

@@ -124,6 +124,11 @@ impl ConfigError {
     }
 }
 
+/// A message of the parser on one line. It may quote characters of the file.
+pub(super) fn printable(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { c.escape_debug().to_string() } else { c.to_string() }).collect()
+}
+
 /// A text of a file as messages show it: on one line, and not too long.
 pub(super) fn shown(text: &str) -> String {
     const MOST: usize = 60;

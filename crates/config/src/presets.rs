@@ -42,7 +42,7 @@ static PRESETS: LazyLock<Vec<(&Path, File)>> = LazyLock::new(|| {
 /// A file of the program.
 fn native(name: &str, text: &str) -> File {
     let path = Path::new(name);
-    let map = document::parse(path, text.as_bytes());
+    let map = document::parse_text(path, text);
     map.and_then(|map| File::read(path, &map)).expect("the program's own configurations are right")
 }
 

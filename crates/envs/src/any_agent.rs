@@ -17,6 +17,10 @@ use crate::shard::AgentShards;
 
 /// An [`Agent`] as a trait object. It is implemented for every agent; do not implement it by hand.
 pub trait AnyAgent: Send + Sync {
+    /// Registry name, as in the facts.
+    fn id(&self) -> String {
+        self.facts().id
+    }
     /// Constant facts.
     fn facts(&self) -> Facts;
     /// The compiled model.
@@ -152,7 +156,7 @@ pub(crate) fn check(id: &str, known: &[OptionInfo], options: &Options) -> Result
         let Some(info) = known.iter().find(|info| info.name == name) else {
             let names = || known.iter().map(|info| info.name);
             let nearest = nearest(name, names()).map(Into::into);
-            let known = if known.is_empty() { "none".into() } else { names().collect::<Vec<_>>().join(", ") };
+            let known = names().collect::<Vec<_>>().join(", ");
             return Err(EnvError::UnknownOption { id, name: name.into(), nearest, known });
         };
         if !info.takes(value) {

@@ -35,7 +35,7 @@ impl Default for Registry {
     fn default() -> Self {
         let mut registry = Registry::empty();
         for agent in agents::all() {
-            registry.agents.push((agent.facts().id, agent));
+            registry.agents.push((agent.id(), agent));
         }
         for (alias, id) in agents::aliases() {
             registry.aliases.push((alias.into(), id.into()));
@@ -60,7 +60,7 @@ impl Registry {
     /// # Errors
     /// If the id is taken, or the agent does not fit its model.
     pub fn register(&mut self, agent: Arc<dyn AnyAgent>) -> Result<(), EnvError> {
-        let id = agent.facts().id;
+        let id = agent.id();
         if self.find(&id).is_some() {
             let base = id.rsplit_once("-v").map_or(id.as_str(), |(base, _)| base);
             let free = (0..).map(|v| format!("{base}-v{v}")).find(|name| self.find(name).is_none());

@@ -5,6 +5,7 @@ use super::scene::{self, Scene};
 use crate::error::CliError;
 use marathon_envs::{EnvError, ModelSource, registry};
 use marathon_physics::lanes::Isa;
+use marathon_physics::mjcf::MjcfError;
 use marathon_physics::workload::{Report, Workload};
 use marathon_physics::{Model, SimError, SimOptions};
 use marathon_runs::PolicySource;
@@ -33,12 +34,15 @@ pub enum Source {
     File(PathBuf),
 }
 
-impl From<ModelSource> for Source {
-    fn from(source: ModelSource) -> Self {
+impl TryFrom<ModelSource> for Source {
+    type Error = MjcfError;
+
+    fn try_from(source: ModelSource) -> Result<Self, MjcfError> {
         match source {
-            ModelSource::Text(text) => Source::Text(text.into()),
-            ModelSource::File(path) => Source::File(path),
-            ModelSource::Edited { spec, .. } => Source::Text(spec.to_xml()),
+            ModelSource::Text(text) => Ok(Source::Text(text.into())),
+            ModelSource::File(path) => Ok(Source::File(path)),
+            ModelSource::Edited { spec, .. } => Ok(Source::Text(spec.to_xml())),
+            ModelSource::Broken(error) => Err(*error),
         }
     }
 }
@@ -50,7 +54,7 @@ impl Subject {
     /// If there is no such agent.
     pub fn agent(id: String) -> Result<Self, CliError> {
         let agent = registry::agent(&id)?;
-        let source = agent.facts().model.into();
+        let source = agent.facts().model.try_into()?;
         Ok(Subject { name: id, model: agent.model()?, source, scenes: Vec::new() })
     }
 
@@ -72,7 +76,7 @@ impl Subject {
         let (policy, factory) = PolicySource { policy: file.into(), ..Default::default() }.load()?;
         let spec = factory.spec();
         let agent = registry::global().agent_with(&spec.id, &spec.options)?;
-        let (model, source) = (agent.model()?, agent.facts().model.into());
+        let (model, source) = (agent.model()?, agent.facts().model.try_into()?);
         let scenes = scene::record(&policy, agents, spec.frame_skip)?;
         Ok(Subject { name: spec.id.clone(), model, source, scenes })
     }

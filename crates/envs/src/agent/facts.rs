@@ -117,6 +117,8 @@ pub enum ModelSource {
         /// The model with the changes.
         spec: Arc<ModelSpec>,
     },
+    /// A model that could not be made. Its users get the error.
+    Broken(Box<MjcfError>),
 }
 
 impl PartialEq for ModelSource {
@@ -127,6 +129,7 @@ impl PartialEq for ModelSource {
             (ModelSource::Edited { path: a, spec: x }, ModelSource::Edited { path: b, spec: y }) => {
                 a == b && x.to_xml() == y.to_xml()
             }
+            (ModelSource::Broken(a), ModelSource::Broken(b)) => a == b,
             _ => false,
         }
     }
@@ -137,14 +140,14 @@ impl ModelSource {
     pub fn text(&self) -> Option<&str> {
         match self {
             ModelSource::Text(text) => Some(text),
-            ModelSource::File(_) | ModelSource::Edited { .. } => None,
+            ModelSource::File(_) | ModelSource::Edited { .. } | ModelSource::Broken(_) => None,
         }
     }
 
     /// The file that it was read from.
     pub fn file(&self) -> Option<&Path> {
         match self {
-            ModelSource::Text(_) => None,
+            ModelSource::Text(_) | ModelSource::Broken(_) => None,
             ModelSource::File(path) | ModelSource::Edited { path, .. } => Some(path),
         }
     }
@@ -152,12 +155,13 @@ impl ModelSource {
     /// The model, to edit or compile it. `name` stands for a text in messages.
     ///
     /// # Errors
-    /// If a file cannot be read, or the model is not well-formed XML.
+    /// If a file cannot be read, the model is not well-formed XML, or it could not be made.
     pub fn spec(&self, name: &str) -> Result<ModelSpec, MjcfError> {
         match self {
             ModelSource::Text(text) => ModelSpec::from_xml_str(text, name),
             ModelSource::File(path) => ModelSpec::from_xml_file(path),
             ModelSource::Edited { spec, .. } => Ok(ModelSpec::clone(spec)),
+            ModelSource::Broken(error) => Err(MjcfError::clone(error)),
         }
     }
 }
@@ -166,6 +170,13 @@ impl ModelSource {
 impl From<ModelSpec> for ModelSource {
     fn from(spec: ModelSpec) -> Self {
         spec.to_xml().into()
+    }
+}
+
+/// An edited model as text, or the error of the edit. Facts have no errors, so the model hands it on.
+impl From<Result<ModelSpec, MjcfError>> for ModelSource {
+    fn from(spec: Result<ModelSpec, MjcfError>) -> Self {
+        spec.map_or_else(|error| ModelSource::Broken(error.into()), Into::into)
     }
 }
 

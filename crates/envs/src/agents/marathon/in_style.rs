@@ -135,7 +135,7 @@ macro_rules! clip {
     ($name:ident, $file:literal) => {
         static $name: LazyLock<Arc<Clip>> = LazyLock::new(|| {
             let text = const { marathon_assets::text(concat!("motions/", $file)) };
-            Arc::new(Clip::parse(Path::new($file), text.as_bytes()).unwrap_or_else(|error| panic!("{error}")))
+            Arc::new(Clip::shipped(Path::new($file), text).unwrap_or_else(|error| panic!("{error}")))
         });
     };
 }

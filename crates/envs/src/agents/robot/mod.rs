@@ -34,9 +34,10 @@ use std::sync::{Arc, OnceLock};
 
 use marathon_physics::Model;
 use marathon_physics::lanes::Isa;
+use marathon_physics::mjcf::MjcfError;
 
 use crate::agent::options::OptionSet;
-use crate::agent::{Agent, Facts, OptionInfo, Options};
+use crate::agent::{Agent, Facts, ModelSource, OptionInfo, Options};
 use crate::any_agent::AnyAgent;
 use crate::error::EnvError;
 use crate::shard::AgentShards;
@@ -51,7 +52,7 @@ pub const MODEL: &str = "xml_file";
 #[derive(Default)]
 pub struct AnyRobot {
     arguments: RobotArguments,
-    robot: OnceLock<Arc<Robot>>,
+    robot: OnceLock<Result<Arc<Robot>, MjcfError>>,
 }
 
 impl AnyRobot {
@@ -61,24 +62,39 @@ impl AnyRobot {
     /// If the model cannot be read, or is no robot that moves over the ground.
     pub fn new(arguments: RobotArguments) -> Result<AnyRobot, EnvError> {
         let robot = Arc::new(Robot::new(Rig::new(&arguments)?, arguments.clone()));
-        Ok(AnyRobot { arguments, robot: robot.into() })
+        Ok(AnyRobot { arguments, robot: Ok(robot).into() })
     }
 
-    fn robot(&self) -> &Arc<Robot> {
-        self.robot.get_or_init(|| {
-            let rig = Rig::new(&self.arguments).expect("the shipped model is a robot");
-            Arc::new(Robot::new(rig, self.arguments.clone()))
-        })
+    /// The robot, or why the shipped model cannot be read.
+    fn robot(&self) -> Result<&Arc<Robot>, MjcfError> {
+        let made = self.robot.get_or_init(|| match Rig::new(&self.arguments) {
+            Ok(rig) => Ok(Arc::new(Robot::new(rig, self.arguments.clone()))),
+            Err(EnvError::Model { source, .. }) => Err(*source),
+            Err(error) => panic!("the shipped model is a robot: {error}"),
+        });
+        made.as_ref().map_err(Clone::clone)
+    }
+
+    /// The error of a model that cannot be read.
+    fn broken(source: MjcfError) -> EnvError {
+        EnvError::Model { id: rig::ID.into(), source: source.into() }
     }
 }
 
 impl AnyAgent for AnyRobot {
+    fn id(&self) -> String {
+        rig::ID.into()
+    }
+
     fn facts(&self) -> Facts {
-        Agent::facts(&**self.robot())
+        match self.robot() {
+            Ok(robot) => Agent::facts(&**robot),
+            Err(error) => Facts { id: self.id(), model: ModelSource::Broken(error.into()), ..Facts::default() },
+        }
     }
 
     fn model(&self) -> Result<Model, EnvError> {
-        Ok(self.robot().rig.model.clone())
+        Ok(self.robot().map_err(Self::broken)?.rig.model.clone())
     }
 
     fn options(&self) -> Vec<OptionInfo> {
@@ -94,10 +110,10 @@ impl AnyAgent for AnyRobot {
     }
 
     fn shards_as(self: Arc<Self>, facts: Facts, isa: Isa) -> Result<Arc<dyn AgentShards>, EnvError> {
-        self.robot().clone().shards_as(facts, isa)
+        self.robot().map_err(Self::broken)?.clone().shards_as(facts, isa)
     }
 
     fn findings(&self) -> Option<String> {
-        Some(self.robot().rig.to_string())
+        self.robot().ok().map(|robot| robot.rig.to_string())
     }
 }

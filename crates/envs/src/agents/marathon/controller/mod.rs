@@ -221,10 +221,11 @@ impl<F: Figure> Agent for Controller<F> {
             facts.roles = commander::roles(input, facts.actions.clone(), &seen, &own);
             facts.actions.extend(names(commander::actions(input)));
             facts.reward_terms = names(own.iter().chain(&commander::TERMS));
-            let mut spec = facts.model.spec(F::ID).expect("the figures' models can be read");
-            let added = idle::add_actuators(&mut spec, "rootx", commander::actions(input));
-            added.expect("the figures have a rootx, and no motor of these names");
-            facts.model = spec.into();
+            let opposed = facts.model.spec(F::ID).and_then(|mut spec| {
+                idle::add_actuators(&mut spec, "rootx", commander::actions(input))?;
+                Ok(spec)
+            });
+            facts.model = opposed.into();
             (facts.observation, facts.termination_reward) = (None, None);
             facts.command = Vec::new();
             facts.info.extend(names(commander::actions(input)));

@@ -159,28 +159,22 @@ impl Choice for Control {
 /// The model with the actuators for a kind of control.
 pub fn model(control: Control) -> ModelSource {
     // the registry reads the facts of every task at the start, so the edits are made once, when they are needed
-    static PD: LazyLock<String> = LazyLock::new(|| servos(Control::Pd));
-    static PD_RANGE: LazyLock<String> = LazyLock::new(|| servos(Control::PdRange));
-    static SERVO: LazyLock<String> = LazyLock::new(|| servos(Control::Servo));
-    let text: &'static str = match control {
-        Control::Pd => &PD,
-        Control::PdRange => &PD_RANGE,
-        Control::Torque => MODEL,
-        Control::Servo => &SERVO,
-    };
-    text.into()
-}
-
-/// MJCF of the model with servos in place of its motors.
-fn servos(control: Control) -> String {
-    with_servos(control).expect("the figure has a motor for each joint").to_xml()
+    static PD: LazyLock<ModelSource> = LazyLock::new(|| with_servos(Control::Pd).into());
+    static PD_RANGE: LazyLock<ModelSource> = LazyLock::new(|| with_servos(Control::PdRange).into());
+    static SERVO: LazyLock<ModelSource> = LazyLock::new(|| with_servos(Control::Servo).into());
+    match control {
+        Control::Pd => PD.clone(),
+        Control::PdRange => PD_RANGE.clone(),
+        Control::Torque => MODEL.into(),
+        Control::Servo => SERVO.clone(),
+    }
 }
 
 /// The model with servos in place of its motors, and without the original's drive, which they replace.
 fn with_servos(control: Control) -> Result<ModelSpec, MjcfError> {
     let mut spec = ModelSpec::from_xml_str(MODEL, "marathon_man")?;
     spec.default_mut("main", "joint")?.unset("damping")?.unset("stiffness")?;
-    let ranges = (control == Control::PdRange).then(middles_and_halves);
+    let ranges = (control == Control::PdRange).then(middles_and_halves).transpose()?;
     for i in ACTIONS {
         let Joint { name, stiffness, strength, original, .. } = &JOINTS[i];
         spec.remove(Kind::Actuator, name)?;
@@ -203,12 +197,12 @@ fn with_servos(control: Control) -> Result<ModelSpec, MjcfError> {
 }
 
 /// Middle of each joint's range and half its width, rad.
-fn middles_and_halves() -> [[f64; 2]; 21] {
-    let model = Model::from_xml_str(MODEL, "marathon_man").expect("the model is valid");
-    std::array::from_fn(|i| {
+fn middles_and_halves() -> Result<[[f64; 2]; 21], MjcfError> {
+    let model = Model::from_xml_str(MODEL, "marathon_man")?;
+    Ok(std::array::from_fn(|i| {
         let [low, high] = model.joints[1 + i].range;
         [0.5 * (low + high), 0.5 * (high - low)]
-    })
+    }))
 }
 
 #[cfg(test)]

@@ -20,7 +20,7 @@ macro_rules! shipped {
             name: $name,
             clip: LazyLock::new(|| {
                 let text = const { marathon_assets::text(concat!("motions/marathon_man/", $name, ".motion")) };
-                let clip = Clip::parse(Path::new(concat!($name, ".motion")), text.as_bytes());
+                let clip = Clip::shipped(Path::new(concat!($name, ".motion")), text);
                 Arc::new(clip.unwrap_or_else(|error| panic!("{error}")))
             }),
         }),*]

@@ -267,7 +267,7 @@ impl<F: Runner> Agent for Terrain<F> {
         Facts {
             id: F::ID.into(),
             summary: F::SUMMARY.into(),
-            model: self.model().expect("the figures' models have a floor").into(),
+            model: self.model().into(),
             observation: None,
             actions,
             reward_terms: terms,
