@@ -188,3 +188,39 @@ fn straight_knees_bend() {
         assert!(!chosen.to_string().contains("bent"), "{file}");
     }
 }
+
+/// A cart on four wheels, moved by actuators such as `<motor .../>`.
+fn cart(actuator: &str, wheel: &str) -> Rig {
+    let [mut wheels, mut actuators] = [const { String::new() }; 2];
+    for (i, [x, y]) in [[0.2, 0.25], [0.2, -0.25], [-0.2, 0.25], [-0.2, -0.25]].into_iter().enumerate() {
+        wheels += &format!(
+            "<body name='w{i}' pos='{x} {y} 0'><joint name='w{i}' axis='0 1 0'/><geom {wheel} euler='90 0 0'/></body>"
+        );
+        actuators += &format!("<{actuator} joint='w{i}' ctrlrange='-2 2'/>");
+    }
+    let text = format!(
+        "<mujoco><worldbody><body name='cart' pos='0 0 .15'><freejoint/><geom type='box' size='.3 .2 .05'/>{wheels}</body>\
+         </worldbody><actuator>{actuators}</actuator></mujoco>"
+    );
+    let name = format!("marathon-cart-{}-{}.xml", std::process::id(), actuator.len() + wheel.len());
+    let path = std::env::temp_dir().join(name);
+    std::fs::write(&path, text).expect("a file");
+    let arguments = RobotArguments::default().with(&Options::new().with("xml_file", path.to_string_lossy().as_ref()));
+    let rig = Rig::new(&arguments).unwrap_or_else(|error| panic!("{error}"));
+    let _ = std::fs::remove_file(path);
+    rig
+}
+
+#[test]
+fn wheels_are_no_feet() {
+    let round = "type='cylinder' size='.1 .03'";
+    for actuator in ["velocity kv='1'", "motor"] {
+        let rig = cart(actuator, round);
+        assert!(rig.feet.is_empty() && !rig.clock, "{rig}");
+        assert!(rig.drives.iter().all(|drive| matches!(drive, Drive::Direct([0.0, 2.0]))), "{rig}");
+        assert!(rig.to_string().contains("feet       none: it rolls on w0, w1, w2, w3"), "{rig}");
+    }
+    // a paddle turns as well, but does not roll
+    assert_eq!(cart("motor", "type='box' size='.1 .02 .03'").feet.len(), 4);
+    assert_eq!(cart("motor", "type='cylinder' size='.1 .03' pos='0 0 -.05'").feet.len(), 4);
+}

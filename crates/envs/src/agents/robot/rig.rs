@@ -15,7 +15,7 @@ use super::hold::Hold;
 use super::knees;
 use super::legs::{legs, moves_sideways};
 use super::servos::{self, Drive};
-use super::stance::{self, Foot, Root, Stance};
+use super::stance::{self, Foot, Root, Stance, counted};
 use crate::agent::ModelSource;
 use crate::error::EnvError;
 
@@ -111,7 +111,7 @@ impl Rig {
         if !chosen {
             let bent = knees::bend(&given, &mut first.qpos, root.0, first.height, &first.feet);
             if bent > 0 {
-                pose += &format!(", {bent} straight knee{} bent", if bent == 1 { "" } else { "s" });
+                pose += &format!(", {} bent", counted(bent, "straight knee"));
                 first = stance::stand(&given, root, first.qpos, &arguments.feet).map_err(wrong)?;
             }
         }
@@ -265,8 +265,12 @@ impl fmt::Display for Rig {
             false => name(foot.body),
         });
         let names: Vec<String> = names.collect();
+        let pose = Pose::of(model, &self.qpos);
+        let wheels = (1..model.bodies.len()).filter(|body| stance::is_wheel(model, &pose, *body));
+        let wheels: Vec<String> = wheels.map(name).collect();
         match names.as_slice() {
-            [] => writeln!(f, "feet       none: it lies on the ground")?,
+            [] if wheels.is_empty() => writeln!(f, "feet       none: it lies on the ground")?,
+            [] => writeln!(f, "feet       none: it rolls on {}", wheels.join(", "))?,
             names => writeln!(f, "feet       {}", names.join(", "))?,
         }
         if self.clock {
@@ -290,7 +294,9 @@ impl fmt::Display for Rig {
             )?;
         }
         if servos.len() < self.drives.len() {
-            writeln!(f, "direct     {} actuators whose control is the action", self.drives.len() - servos.len())?;
+            let direct = self.drives.len() - servos.len();
+            let whose = if direct == 1 { "actuator whose control" } else { "actuators whose control" };
+            writeln!(f, "direct     {direct} {whose} is the action")?;
         }
         if let Some(hold) = self.hold {
             let Hold { height, tilt } = hold;
@@ -298,7 +304,7 @@ impl fmt::Display for Rig {
             writeln!(f, "stands     {height:.2} of its height and {tilt:.0} degrees off after 1 s{note}")?;
         }
         if self.changes.hardened > 0 {
-            writeln!(f, "contacts   made hard at {} geoms of the feet", self.changes.hardened)?;
+            writeln!(f, "contacts   made hard at {} of the feet", counted(self.changes.hardened, "geom"))?;
         }
         let [ahead, side, turn] = self.fastest;
         write!(f, "commands   up to {ahead:.2} m/s ahead, {side:.2} m/s to a side, {turn:.2} rad/s")

@@ -1,8 +1,11 @@
 //! The servos of a robot: those of its model, and new ones in place of motors.
 
+use marathon_motion::kinematics::Pose;
 use marathon_physics::mjcf::MjcfError;
 use marathon_physics::model::{Actuator as Compiled, Dynamics, JointType, Model};
 use marathon_physics::spec::{Actuator, ModelSpec};
+
+use super::stance::is_wheel;
 
 /// Damping of a new servo, as a multiple of its stiffness, s.
 const DAMPING: f64 = 0.03;
@@ -76,10 +79,15 @@ fn strength(model: &Model, actuator: &Compiled, joint: usize, height: f64) -> f6
 /// many there were.
 pub fn replace_motors(spec: &mut ModelSpec, height: f64, ratio: f64) -> Result<usize, MjcfError> {
     let model = spec.compile()?;
+    let pose = Pose::of(&model, &model.qpos0);
     let mut replaced = 0;
     for actuator in &model.actuators {
         let Some(index) = motor_joint(&model, actuator) else { continue };
         let joint = &model.joints[index];
+        // a wheel has no target to hold
+        if is_wheel(&model, &pose, joint.body) {
+            continue;
+        }
         let dof = &model.dofs[joint.dof_adr];
         let most = strength(&model, actuator, index, height);
         // a servo much quicker than the steps would shake

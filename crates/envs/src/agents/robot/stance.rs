@@ -14,6 +14,8 @@ const MARGIN: f64 = 0.05;
 const REACH: f64 = 0.15;
 /// Least cosine of the slope of a plane that is ground.
 const LEVEL: f64 = 0.99;
+/// Largest distance of a wheel's center from its axis, as a part of its radius.
+const CENTERED: f64 = 0.1;
 /// Without legs the root or its neighbors lie on the ground, this close (part of the height, and meters).
 const LYING: f64 = 0.02;
 
@@ -45,6 +47,11 @@ pub struct Foot {
     pub sole: [f64; 3],
     /// The same in the world, m.
     pub place: [f64; 3],
+}
+
+/// A number of things: `1 joint`, `2 joints`.
+pub fn counted(n: usize, noun: &str) -> String {
+    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }
 
 /// The joints of the root and the body that they move, or why there are none.
@@ -95,7 +102,16 @@ pub fn pose(model: &Model, name: &str) -> Result<(Vec<f64>, String, bool), Strin
         moved += usize::from(inside != qpos[joint.qpos_adr]);
         qpos[joint.qpos_adr] = inside;
     }
-    let moved = if moved > 0 { format!(", {moved} joints moved into their ranges") } else { String::new() };
+    let moved = if moved > 0 {
+        format!(
+            ", {} moved into {} range{}",
+            counted(moved, "joint"),
+            if moved == 1 { "its" } else { "their" },
+            if moved == 1 { "" } else { "s" }
+        )
+    } else {
+        String::new()
+    };
     Ok((qpos, format!("the reference pose{moved}"), false))
 }
 
@@ -153,6 +169,28 @@ fn geoms_of(model: &Model, body: usize) -> impl Iterator<Item = usize> {
         .filter(move |g| model.bodies[model.geoms[*g].body].weld_id == body && collides(&model.geoms[*g]))
 }
 
+/// Whether a body is a wheel: it turns without end about the axis of round geoms.
+pub fn is_wheel(model: &Model, pose: &Pose, body: usize) -> bool {
+    let own = &model.bodies[body];
+    let joint = own.joint_start;
+    if own.joint_count != 1 || model.joints[joint].kind != JointType::Hinge || model.joints[joint].limited {
+        return false;
+    }
+    let axis = pose.axes[joint];
+    let is_round = |g: usize| {
+        let geom = &model.geoms[g];
+        let off = pose.point(geom.body, DVec3::from_array(geom.pos)) - pose.anchors[joint];
+        let centered = off.cross(axis).length() < CENTERED * geom.size[0];
+        match geom.kind {
+            GeomType::Sphere | GeomType::Ellipsoid => centered,
+            GeomType::Cylinder => centered && (turn(pose, geom) * DVec3::Z).dot(axis).abs() > LEVEL,
+            _ => false,
+        }
+    };
+    let mut geoms = geoms_of(model, body).peekable();
+    geoms.peek().is_some() && geoms.all(is_round)
+}
+
 /// How a robot stands.
 #[derive(Clone, Debug)]
 pub struct Stance {
@@ -194,7 +232,7 @@ pub fn stand(model: &Model, root: (usize, Root), mut qpos: Vec<f64>, names: &str
     let sole = |b: usize| geoms_of(model, b).map(|g| bottom(&pose, g)).min_by(|a, b| a.z.total_cmp(&b.z));
     let ends: Vec<usize> = match names {
         "auto" => (1..model.bodies.len())
-            .filter(|b| moving(*b) && of_robot(*b) && *b != body && !carries[*b])
+            .filter(|b| moving(*b) && of_robot(*b) && *b != body && !carries[*b] && !is_wheel(model, &pose, *b))
             .filter(|b| sole(*b).is_some_and(|p| p.z - ground <= REACH * height))
             .collect(),
         names => names.split(',').map(|name| named_foot(model, name.trim())).collect::<Result<_, _>>()?,
