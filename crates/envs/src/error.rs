@@ -6,20 +6,43 @@ use marathon_physics::hint::{did_you_mean, listed};
 use marathon_physics::mjcf::MjcfError;
 use thiserror::Error;
 
+/// The names like an unknown one, or where all are.
+fn others(similar: &str, count: usize) -> String {
+    match similar {
+        "" => format!("`marathon list` lists all {count}"),
+        similar => format!("the most similar of {count}: {similar}"),
+    }
+}
+
+/// The options of an agent behind the name of one that it lacks.
+fn options(near: Option<&String>, known: &str) -> String {
+    if known.is_empty() { "; it has no options".into() } else { listed(near, known) }
+}
+
 /// Errors of the registry, of agents and of [`VecEnv`](crate::VecEnv).
 #[derive(Debug, Error)]
 pub enum EnvError {
     /// No agent of this name is registered.
-    #[error("agent '{name}' does not exist{}; the most similar of {count}: {similar}", did_you_mean(.nearest.as_ref()))]
+    #[error("agent '{name}' does not exist{}; {}", did_you_mean(.nearest.as_ref()), others(similar, *count))]
     UnknownAgent {
         /// The requested name.
         name: String,
         /// The closest registered name, if any is close.
         nearest: Option<String>,
-        /// The most similar registered names, comma separated.
+        /// The most similar registered names, comma separated; empty if none is like it.
         similar: String,
         /// Number of registered names.
         count: usize,
+    },
+    /// The name of an agent is the path of something that is no model.
+    #[error("'{path}' is {found}, expected the name of an agent, or a model in MJCF with the ending .xml{hint}")]
+    NotAModel {
+        /// The name.
+        path: String,
+        /// What the path is.
+        found: &'static str,
+        /// A way to make a model of it.
+        hint: &'static str,
     },
     /// The name is registered already.
     #[error("agent '{id}' is registered already; give the new one another id, such as '{suggestion}'")]
@@ -30,7 +53,7 @@ pub enum EnvError {
         suggestion: String,
     },
     /// The agent has no such argument.
-    #[error("agent '{id}' takes no option '{name}'{}", listed(.nearest.as_ref(), known))]
+    #[error("agent '{id}' takes no option '{name}'{}", options(.nearest.as_ref(), known))]
     UnknownOption {
         /// Registry name of the agent.
         id: String,
@@ -38,7 +61,7 @@ pub enum EnvError {
         name: String,
         /// The closest argument, if any is close.
         nearest: Option<String>,
-        /// All arguments of the agent, comma separated.
+        /// All arguments of the agent, comma separated; empty if it has none.
         known: String,
     },
     /// The value is invalid for the argument.

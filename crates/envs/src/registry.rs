@@ -3,6 +3,7 @@
 //! The global registry starts with the crate's own agents, and [`register`] adds others. Create a [`Registry`] to avoid
 //! global state.
 
+use std::path::Path;
 use std::sync::{Arc, LazyLock, PoisonError, RwLock};
 
 use marathon_physics::hint::{nearest, similar};
@@ -16,11 +17,34 @@ use crate::shard::{AgentShards, ShardFactory};
 
 /// Number of similar names in an error.
 const SIMILAR: usize = 5;
+/// Number of characters that similar names have in common.
+const ALIKE: usize = 3;
 
 /// The arguments that the path of an MJCF file stands for. `None` for other names.
 pub fn robot_options(name: &str) -> Option<Options> {
-    let is_file = std::path::Path::new(name).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml"));
+    let is_file = Path::new(name).extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml"));
     is_file.then(|| Options::new().with(robot::MODEL, name))
+}
+
+/// The error of a name that is the path of something else than a model.
+fn not_a_model(name: &str) -> Option<EnvError> {
+    let path = Path::new(name);
+    let ending = path.extension().unwrap_or_default();
+    let found = match (path.is_dir(), path.exists()) {
+        (true, _) => "a folder",
+        (_, true) => "a file",
+        _ if ["urdf", "mjcf"].iter().any(|known| ending.eq_ignore_ascii_case(known)) => "a file that does not exist",
+        _ => return None,
+    };
+    let hint = if ending.eq_ignore_ascii_case("urdf") { "; MuJoCo converts URDF" } else { "" };
+    Some(EnvError::NotAModel { path: name.into(), found, hint })
+}
+
+/// Whether a name may mean another one: they begin alike, or one is a part of the other.
+fn is_like(name: &str, id: &str) -> bool {
+    let [name, id] = [name, id].map(str::to_lowercase);
+    let common = name.chars().zip(id.chars()).take_while(|(a, b)| a == b).count();
+    common >= ALIKE || (name.chars().count() >= ALIKE && id.contains(&name))
 }
 
 /// Agents by name.
@@ -88,7 +112,13 @@ impl Registry {
                 let base = nearest(name, bases.iter().copied())?;
                 bases.iter().position(|b| *b == base).map(|i| ids[i])
             });
-            let similar = similar(name, ids.iter().copied(), SIMILAR).join(", ");
+            if near.is_none()
+                && let Some(error) = not_a_model(name)
+            {
+                return error;
+            }
+            let like = near.is_some() || ids.iter().any(|id| is_like(name, id));
+            let similar = if like { similar(name, ids.iter().copied(), SIMILAR).join(", ") } else { String::new() };
             EnvError::UnknownAgent { name: name.into(), nearest: near.map(Into::into), similar, count: ids.len() }
         })
     }

@@ -33,8 +33,19 @@ fn an_unknown_name_gets_the_nearest_ones() {
     similar("hoper", "; did you mean 'Hopper-v0'?", five);
     let five = "Humanoid-v0, Humanoid-v1, Humanoid-v5, humanoid-run-v0, humanoid-walk-v0";
     similar("Humanoid-v3", "; did you mean 'Humanoid-v0'?", five);
-    assert!(!id("elephant").contains("did you mean"), "{}", id("elephant"));
-    assert_eq!(id("elephant").rsplit(", ").count(), 5);
+    assert!(!id("walking").contains("did you mean"), "{}", id("walking"));
+    assert_eq!(id("walking").rsplit(", ").count(), 5);
+    // nothing is like it
+    assert_eq!(id("elephant"), format!("agent 'elephant' does not exist; `marathon list` lists all {count}"));
+}
+
+#[test]
+fn a_path_that_is_no_model_says_so() {
+    let expected = "expected the name of an agent, or a model in MJCF with the ending .xml";
+    let (folder, file) = (env!("CARGO_MANIFEST_DIR"), concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"));
+    assert_eq!(id(folder), format!("'{folder}' is a folder, {expected}"));
+    assert_eq!(id(file), format!("'{file}' is a file, {expected}"));
+    assert_eq!(id("dog.urdf"), format!("'dog.urdf' is a file that does not exist, {expected}; MuJoCo converts URDF"));
 }
 
 #[test]
@@ -146,7 +157,7 @@ mod with_arguments {
         );
         assert_eq!(
             refusal("hopper", &Options::new().with("effort_weight", 1.0)),
-            "agent 'Hopper-v0' takes no option 'effort_weight'; known: none"
+            "agent 'Hopper-v0' takes no option 'effort_weight'; it has no options"
         );
     }
 
