@@ -29,7 +29,7 @@ fn a_setting_of_the_command_line_is_that_of_the_run() {
         ("ppo.lrr=1", "--set: ppo.lrr: unknown key; did you mean 'lr'?"),
         ("lr=1", "--set: lr: unknown key; did you mean 'ppo.lr'?"),
         ("ppo.lr", "--set: ppo.lr: found nothing, expected a positive number"),
-        ("ppo.epochs=2.5", "--set: ppo.epochs: found '2.5', expected a whole number above 0"),
+        ("ppo.epochs=2.5", "--set: ppo.epochs: found '2.5', expected a whole number between 1 and 1000"),
         ("ppo.minibatches=1000", "--set: ppo.minibatches: found 1000, expected at most 512"),
         ("sac.lr=1e-3", "--set: sac.lr: found sac, expected ppo, the algorithm of this configuration"),
         ("run.agents=100", "--set: run.agents: found 100, expected a multiple of 16, such as 96"),

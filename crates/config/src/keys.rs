@@ -2,19 +2,25 @@
 //! `docs/reference/configs.md` prints it, and a test compares it with the fields of `TrainConfig`.
 
 use super::section::Range;
-use Kind::{Count, Flag, Number, Optional, Pair, Schedule, Text, Widths, Word, Words};
+use Kind::{Count, Flag, Number, Optional, Pair, Schedule, Steps, Text, Widths, Word, Words};
 use marathon_learn::{Activation, Algorithm};
 
 /// Most of anything that is counted.
 const MOST: u64 = 1 << 31;
+/// Most passes over a rollout. More would only repeat what the policy has learned from it.
+pub const MOST_EPOCHS: u64 = 1000;
+/// Most rollouts of an iteration.
+const MOST_ROLLOUTS: u64 = 1_000_000;
 /// Most steps of a run.
-const MOST_STEPS: u64 = 1 << 53;
+pub const MOST_STEPS: u64 = 1 << 53;
 
 /// Type of a key's value.
 #[derive(Clone, Copy, Debug)]
 pub enum Kind {
     /// A whole number within bounds.
     Count(u64, u64),
+    /// A number of steps from a least one, with the short forms of [`steps`](super::steps).
+    Steps(u64),
     /// A number.
     Number(Range),
     /// A number, or `{from: A, to: B}`: from the start of the run to its end, linearly.
@@ -39,8 +45,9 @@ impl Kind {
     /// The expected value in words, for messages and the reference.
     pub fn text(self) -> String {
         match self {
-            Count(0, MOST | MOST_STEPS | u64::MAX) => "a whole number".into(),
-            Count(1, MOST | MOST_STEPS) => "a whole number above 0".into(),
+            Count(0, MOST | u64::MAX) | Steps(0) => "a whole number".into(),
+            Count(1, MOST) => "a whole number above 0".into(),
+            Steps(_) => "a whole number above 0, also as 8e6, 500k or 8M".into(),
             Count(least, most) => format!("a whole number between {least} and {most}"),
             Number(range) => range.text().into(),
             Schedule(range) => format!("{}, or {{from: A, to: B}}", range.text()),
@@ -106,10 +113,10 @@ pub const KEYS: &[Key] = &[
     key(
         RUN,
         "rollouts",
-        Count(1, MOST),
+        Count(1, MOST_ROLLOUTS),
         "rollouts of one iteration, each learned from by itself; an iteration is a row of `progress.csv`",
     ),
-    key(RUN, "total_steps", Count(1, MOST_STEPS), "agent-steps of the whole run"),
+    key(RUN, "total_steps", Steps(1), "agent-steps of the whole run"),
     key(
         RUN,
         "policy_average",
@@ -194,7 +201,7 @@ pub const KEYS: &[Key] = &[
         "divergence per update that the adaptive learning rate aims at, nats",
     ),
     key(PPO, "lr_range", Pair, "bounds of the adaptive learning rate"),
-    key(PPO, "epochs", Count(1, MOST), "passes over each rollout"),
+    key(PPO, "epochs", Count(1, MOST_EPOCHS), "passes over each rollout"),
     key(PPO, "minibatches", Count(1, MOST), "parts that a rollout is split into in every pass"),
     key(
         PPO,
@@ -242,14 +249,14 @@ pub const KEYS: &[Key] = &[
     key(ACKTR, "stats_decay", FRACTION, "decay of the running means of the Fisher matrix's factors"),
     key(ACKTR, "inverse_every", Count(1, MOST), "updates between inversions of the factors"),
     key(SAC, "replay", Count(1, MOST), "agent-steps that are kept"),
-    key(SAC, "warmup", Count(0, MOST_STEPS), "agent-steps before the first update"),
+    key(SAC, "warmup", Steps(0), "agent-steps before the first update"),
     key(SAC, "batch", Count(16, MOST), "samples of an update, a multiple of 16"),
     key(SAC, "updates", Count(1, MOST), "updates after each rollout"),
     key(SAC, "tau", POSITIVE, "part of the way that the slow value networks go in an update"),
     key(SAC, "n_step", Count(1, 65_536), "rewards that count before the value of a state"),
     key(SAC, "init_alpha", POSITIVE, "weight of the entropy at the start"),
-    key(FILE, "summary_freq", Count(1, MOST_STEPS), "agent-steps between progress lines where there is no terminal"),
-    key(FILE, "checkpoint_interval", Count(1, MOST_STEPS), "agent-steps between checkpoints"),
+    key(FILE, "summary_freq", Steps(1), "agent-steps between progress lines where there is no terminal"),
+    key(FILE, "checkpoint_interval", Steps(1), "agent-steps between checkpoints"),
     key(FILE, "keep_checkpoints", Count(0, MOST), "policies on the way that are kept"),
 ];
 

@@ -2,10 +2,10 @@
 
 use super::document::{Field, Map, Node, Value as Yaml};
 use super::error::{ConfigError, Place, shown};
-use super::keys::{self, Kind};
+use super::keys::{self, Kind, MOST_STEPS};
 use super::section::{Entry, Range, Section};
 use super::{document, names};
-use marathon_physics::hint::nearest;
+use marathon_physics::hint::{did_you_mean, nearest};
 use serde_json::{Map as Object, Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -31,9 +31,17 @@ pub struct Layer {
 #[derive(Clone, Debug)]
 pub struct File {
     shared: Layer,
-    tasks: Vec<(String, Layer)>,
+    tasks: Vec<OfTask>,
     /// Whether the preset of the task holds for what the file leaves out.
     pub preset: bool,
+}
+
+/// Settings for a single task.
+#[derive(Clone, Debug)]
+struct OfTask {
+    name: String,
+    place: Place,
+    layer: Layer,
 }
 
 impl File {
@@ -53,7 +61,8 @@ impl File {
         let sections = root.section(TASKS)?;
         for entry in sections.entries() {
             let section = sections.section(entry.key)?;
-            tasks.push((entry.key.to_string(), Layer::read(&section, Part::Task)?));
+            let layer = Layer::read(&section, Part::Task)?;
+            tasks.push(OfTask { name: entry.key.to_string(), place: entry.place, layer });
         }
         let preset = root.flag(PRESET, true)?;
         Ok(File { shared, tasks, preset })
@@ -61,17 +70,36 @@ impl File {
 
     /// Whether the file has a section for a task of this name.
     pub fn has_task(&self, name: &str) -> bool {
-        self.tasks.iter().any(|(known, _)| known.eq_ignore_ascii_case(name))
+        self.tasks.iter().any(|known| known.name.eq_ignore_ascii_case(name))
     }
 
-    /// The file's settings for a task, and a note if the file has only settings for all tasks.
+    /// Refuses a section for a task that does not exist. `task`: the task that is asked for, which a front end may have made.
+    ///
+    /// # Errors
+    /// Names the section and the nearest task.
+    pub fn check_tasks(&self, task: &str) -> Result<(), ConfigError> {
+        for OfTask { name, place, .. } in &self.tasks {
+            if names::find(task, [name.as_str()].into_iter()).is_none()
+                && let Err(near) = names::known(name)
+            {
+                let expected = format!("the name of a task; `marathon list` shows all{}", did_you_mean(near));
+                let place = Place { key: shown(&place.key), ..place.clone() };
+                return Err(ConfigError::value(place, format!("'{}'", shown(name)), expected));
+            }
+        }
+        Ok(())
+    }
+
+    /// The file's settings for a task, and a note if the file has sections for other tasks only.
     pub fn of_task(&self, task: &str) -> (Layer, Option<String>) {
-        let found = names::find(task, self.tasks.iter().map(|(name, _)| name.as_str()));
-        match self.tasks.iter().find(|(name, _)| Some(name.as_str()) == found) {
-            Some((_, layer)) => (self.shared.clone().under(layer), None),
+        let found = names::find(task, self.tasks.iter().map(|known| known.name.as_str()));
+        let own = self.tasks.iter().find(|known| Some(known.name.as_str()) == found);
+        // another name of the task
+        match own.or_else(|| self.tasks.iter().find(|known| names::id(&known.name) == task)) {
+            Some(own) => (self.shared.clone().under(&own.layer), None),
             None if self.tasks.is_empty() => (self.shared.clone(), None),
             None => {
-                let note = format!("nothing about {task} itself: the settings outside of 'tasks' apply");
+                let note = format!("'tasks' has no section for {task}: the settings outside of 'tasks' apply");
                 (self.shared.clone(), Some(note))
             }
         }
@@ -146,7 +174,7 @@ impl Layer {
         for entry in section.entries() {
             let inner = if path.is_empty() { entry.key.into() } else { format!("{path}.{}", entry.key) };
             if !known.contains(&entry.key) {
-                return Err(unknown(entry, &known, path));
+                return Err(unknown(entry, &known, path, part));
             }
             let value = match entry.key {
                 TASKS | PRESET if path.is_empty() => continue,
@@ -155,6 +183,10 @@ impl Layer {
                 _ => match keys::find(&inner) {
                     Some(key) => value(section, &entry, key.kind)?,
                     None if entry.node.is_null() && keys::REWARDS[1..].contains(&inner.as_str()) => Value::Null,
+                    None if entry.node.is_null() && inner == keys::REWARDS[0] => {
+                        let expected = "a mapping such as {gamma: 0.99}: no run is without the task's own reward";
+                        return Err(ConfigError::value(entry.place, "nothing", expected));
+                    }
                     None => Value::Object(self.section(&section.section(entry.key)?, &inner, part)?),
                 },
             };
@@ -235,10 +267,11 @@ pub fn overlay(base: &mut Object<String, Value>, over: &Object<String, Value>) {
 }
 
 /// A key that there is not; a name that another section has is found there.
-fn unknown(entry: Entry<'_>, known: &[&str], path: &str) -> ConfigError {
+fn unknown(entry: Entry<'_>, known: &[&str], path: &str, part: Part) -> ConfigError {
     let Entry { mut place, key, .. } = entry;
     place.key = shown(&place.key);
-    let known: Vec<&str> = known.iter().copied().chain(path.is_empty().then_some(BEHAVIORS)).collect();
+    let of_file = path.is_empty() && part == Part::File;
+    let known: Vec<&str> = known.iter().copied().chain(of_file.then_some(BEHAVIORS)).collect();
     match keys::elsewhere(key).filter(|_| nearest(key, known.iter().copied()).is_none()) {
         Some(elsewhere) => ConfigError::UnknownKey { place, nearest: Some(elsewhere), known: known.join(", ") },
         None => ConfigError::unknown(place, key, &known),
@@ -270,7 +303,15 @@ fn value(section: &Section<'_>, entry: &Entry<'_>, kind: Kind) -> Result<Value, 
     };
     let number = |range: Range| entry.number(range).map(Value::from);
     match kind {
+        Kind::Count(_, most) if entry.is_above(most) => entry.wrong(format!("a whole number up to {most}")),
         Kind::Count(least, most) => entry.count(least..=most).map(Value::from).map_err(whole),
+        Kind::Steps(least) if entry.steps().is_some_and(|n| n > MOST_STEPS) || entry.is_above(MOST_STEPS) => {
+            entry.wrong(format!("a whole number from {least} to {MOST_STEPS}"))
+        }
+        Kind::Steps(least) => match entry.steps().filter(|n| *n >= least) {
+            Some(n) => Ok(n.into()),
+            None => entry.wrong(kind.text()),
+        },
         Kind::Number(range) => number(range),
         Kind::Flag => entry.flag().map(Value::from),
         Kind::Word(words) => entry.word(words).map(|i| words[i].into()),

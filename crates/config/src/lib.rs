@@ -30,3 +30,4 @@ pub use loaded::{Loaded, default_of};
 pub use parse::{convert, parse, parse_object, set};
 pub use presets::{against, default_for};
 pub use reference::reference;
+pub use section::steps;

@@ -1,5 +1,7 @@
 //! Agents under the names of other systems.
 
+use marathon_envs::EnvError;
+use marathon_envs::registry;
 use marathon_envs::shard::role_id;
 
 /// Names of the paper's scenes and of the repository's later versions, without the agent's own. `(agent, names)`
@@ -13,6 +15,22 @@ const BRAINS: [(&str, &[&str]); 4] = [
 /// The registered id of an agent's name; the name itself if no agent is registered under it.
 pub fn id(agent: &str) -> String {
     marathon_envs::agent(agent).map_or_else(|_| agent.to_string(), |found| found.facts().id)
+}
+
+/// Whether a task goes by a name, of this system or another.
+///
+/// # Errors
+/// If none does: the nearest name, if one is close. The path of a model is not the name of a task.
+pub fn known(name: &str) -> Result<(), Option<String>> {
+    if registry::robot_options(name).is_some() {
+        return Err(Some(id("Robot-v0")));
+    }
+    match registry::agent(name) {
+        _ if task(name).is_some() => Ok(()),
+        Ok(_) => Ok(()),
+        Err(EnvError::UnknownAgent { nearest, .. }) => Err(nearest),
+        Err(_) => Err(None),
+    }
 }
 
 /// An id without its version.

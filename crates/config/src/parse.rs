@@ -1,12 +1,13 @@
 //! From the bytes of a file to the settings of a task.
 
 use super::document::{self, Map};
-use super::error::{ConfigError, Place};
+use super::error::{ConfigError, Place, shown};
 use super::layer::{File, Layer};
 use super::loaded::{Loaded, to_yaml};
 use super::mlagents;
 use super::names;
 use super::presets::default_for;
+use marathon_physics::hint::did_you_mean;
 use serde_json::{Map as Object, Value as Json};
 use std::path::Path;
 
@@ -38,6 +39,7 @@ fn read(path: &Path, map: &Map, task: &str) -> Result<Loaded, ConfigError> {
         return mlagents::read(path, map, &task);
     }
     let file = File::read(path, map)?;
+    file.check_tasks(&task)?;
     let (layer, note) = file.of_task(&task);
     let base = if file.preset { default_for(&task) } else { Loaded::default() };
     let mut loaded = base.with(&layer, path)?;
@@ -69,6 +71,15 @@ pub fn set(loaded: Loaded, text: &str) -> Result<Loaded, ConfigError> {
 pub fn convert(path: &Path, bytes: &[u8]) -> Result<(String, Vec<String>), ConfigError> {
     let map = document::parse(path, bytes)?;
     let behaviors = mlagents::behaviors(path, &map)?;
+    if behaviors.is_empty() && !mlagents::has_default(&map) {
+        let place = Place {
+            file: path.into(),
+            line: map.get("behaviors").map_or(1, |field| field.line),
+            key: "behaviors".into(),
+        };
+        let expected = "a behavior with the name of a task, such as Hopper, or default_settings";
+        return Err(ConfigError::value(place, "no behavior", expected));
+    }
     let (mut tasks, mut notes) = (Object::new(), Vec::new());
     for behavior in &behaviors {
         let mut loaded = mlagents::read(path, &map, behavior)?;
@@ -76,6 +87,13 @@ pub fn convert(path: &Path, bytes: &[u8]) -> Result<(String, Vec<String>), Confi
             if !notes.contains(&note) {
                 notes.push(note);
             }
+        }
+        if let Err(near) = names::known(behavior) {
+            notes.push(format!(
+                "no task has the name '{}': rename it before you train with the result{}",
+                shown(behavior),
+                did_you_mean(near)
+            ));
         }
         let name = names::task(behavior).filter(|name| !tasks.contains_key(*name)).unwrap_or(behavior);
         tasks.insert(name.into(), loaded.differences().into());

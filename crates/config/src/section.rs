@@ -161,7 +161,7 @@ impl Range {
 }
 
 impl<'a> Entry<'a> {
-    fn wrong<T>(&self, expected: impl Into<String>) -> Result<T, ConfigError> {
+    pub fn wrong<T>(&self, expected: impl Into<String>) -> Result<T, ConfigError> {
         Err(ConfigError::value(self.place.clone(), self.node.describe(), expected))
     }
 
@@ -180,6 +180,16 @@ impl<'a> Entry<'a> {
     pub fn count(&self, range: RangeInclusive<u64>) -> Result<u64, ConfigError> {
         let n = self.text().and_then(whole).filter(|n| range.contains(n));
         n.map_or_else(|| self.wrong(format!("a whole number between {} and {}", range.start(), range.end())), Ok)
+    }
+
+    /// Whether it is a number above a bound.
+    pub fn is_above(&self, most: u64) -> bool {
+        self.text().and_then(real).is_some_and(|x| x > most as f64)
+    }
+
+    /// A number of steps, also in a short form.
+    pub fn steps(&self) -> Option<u64> {
+        self.text().and_then(steps)
     }
 
     pub fn flag(&self) -> Result<bool, ConfigError> {
@@ -218,6 +228,9 @@ impl<'a> Entry<'a> {
     }
 }
 
+/// Largest whole number below which all are exactly representable; far above anything meant.
+const EXACT: f64 = 9_007_199_254_740_992.0;
+
 /// A number as Python reads it: `5e4`, `1.e7`, `.003`, `1_000`.
 fn real(text: &str) -> Option<f64> {
     let digits = text.contains(|c: char| c.is_ascii_digit());
@@ -226,12 +239,26 @@ fn real(text: &str) -> Option<f64> {
 
 /// A whole number, also written as a float.
 fn whole(text: &str) -> Option<u64> {
-    // exactly representable, and far above anything meant
-    const MOST: f64 = 9_007_199_254_740_992.0;
     text.replace('_', "").parse().ok().or_else(|| {
         let x = real(text)?;
-        (x.fract() == 0.0 && (0.0..=MOST).contains(&x)).then_some(x as u64)
+        (x.fract() == 0.0 && (0.0..=EXACT).contains(&x)).then_some(x as u64)
     })
+}
+
+/// A number of steps: digits with `_` or `,` between them, or a short form such as `500k`, `2.5M`, `1G` or `1e6`. `None` for
+/// anything else, and for a part of a step.
+pub fn steps(text: &str) -> Option<u64> {
+    let text = text.replace(',', "");
+    let (number, factor) = match text.chars().last()? {
+        'k' | 'K' => (&text[..text.len() - 1], 1e3),
+        'm' | 'M' => (&text[..text.len() - 1], 1e6),
+        'g' | 'G' => (&text[..text.len() - 1], 1e9),
+        _ => return whole(&text),
+    };
+    let steps = real(number)? * factor;
+    // 4.35 is not exact
+    let near = steps.round();
+    ((steps - near).abs() <= 1e-9 * near && (0.0..=EXACT).contains(&near)).then_some(near as u64)
 }
 
 fn place(file: &Path, section: &str, key: &str, line: usize) -> Place {

@@ -27,6 +27,8 @@ fn refuse_with(text: &str, part: &str) {
 #[test]
 fn what_is_not_yaml_is_refused_with_its_place() {
     refuse_with("behaviors:\n  Hopper: [1, 2\n", "not YAML");
+    let cut = error("behaviors:\n  {a: 1\n").to_string();
+    assert!(!cut.contains("..") && !cut.contains('\\') && cut.contains("expected ',' or '}'"), "{cut}");
     refuse_with("behaviors:\n\t- x: 3\n", "a/test.yaml:2:");
     refuse("", "a/test.yaml:1:1: found nothing, expected a section such as 'run:' or 'behaviors:'");
     refuse("- 1\n", "a/test.yaml:1:1: found a list, expected a mapping with a section such as 'run:' or 'behaviors:'");
@@ -133,7 +135,7 @@ fn wrong_values_say_what_would_do() {
 fn values_that_do_not_go_together_are_refused() {
     refuse(
         "behaviors: {Hopper: {trainer_type: sac, hyperparameters: {batch_size: 100}}}",
-        "a/test.yaml: configuration: sac.batch is 100, expected a multiple of 16 up to 1048576",
+        "a/test.yaml:1: behaviors.Hopper.hyperparameters.batch_size: found '100', expected a multiple of 16 up to 1048576",
     );
 }
 
@@ -153,6 +155,25 @@ fn agents_that_are_not_in_the_file_are_missed() {
     let message = error("behaviors: {Hoper: {}}").to_string();
     assert!(message.contains("did you mean 'Hopper' for 'Hoper'?"), "{message}");
     assert!(error("behaviors: {}").to_string().contains("the file has none"));
+}
+
+#[test]
+fn a_file_without_behaviors_is_not_converted() {
+    let convert = |text: &str| marathon_config::convert(Path::new("a/test.yaml"), text.as_bytes());
+    let wrong = convert("behaviors: {}").unwrap_err().to_string();
+    let expected = "a behavior with the name of a task, such as Hopper, or default_settings";
+    assert_eq!(wrong, format!("a/test.yaml:1: behaviors: found no behavior, expected {expected}"));
+    // settings that serve all are enough
+    let (_, notes) = convert("behaviors: {}\ndefault_settings: {max_steps: 1000}").unwrap();
+    assert_eq!(notes, Vec::<String>::new());
+    let (_, notes) = convert("behaviors: {Hoper: {}, HopperBrain: {}, xyzzy: {}}").unwrap();
+    assert_eq!(
+        notes,
+        [
+            "no task has the name 'Hoper': rename it before you train with the result; did you mean 'Hopper-v0'?",
+            "no task has the name 'xyzzy': rename it before you train with the result",
+        ]
+    );
 }
 
 #[test]
@@ -213,7 +234,7 @@ fn features_that_are_not_here_are_refused() {
     );
     refuse_with(
         "behaviors: {Hopper: {trainer_type: sac, hyperparameters: {batch_size: 100}}}",
-        "batch is 100, expected a multiple of 16",
+        "batch_size: found '100', expected a multiple of 16",
     );
     refuse_with(
         "Hopper:\n  use_recurrent: true\n",

@@ -92,7 +92,7 @@ tasks:
     assert_eq!((ant.config.algorithm.name(), ant.config.run.total_steps), ("acktr", 1000));
     assert_eq!(
         read(text, "humanoid").notes,
-        ["nothing about Humanoid-v0 itself: the settings outside of 'tasks' apply"]
+        ["'tasks' has no section for Humanoid-v0: the settings outside of 'tasks' apply"]
     );
 }
 
@@ -162,7 +162,36 @@ fn what_is_wrong_is_refused_with_its_line() {
         ),
         ("network: {activation: gelu}\n", "found 'gelu', expected one of swish, tanh, elu, relu"),
         ("statistics: {scale_rewards: maybe}\n", "found 'maybe', expected true or false"),
-        ("rewards: {task: null, rnd: 3}\n", "a.yaml:1: rewards.rnd: found '3', expected a mapping"),
+        ("rewards: {rnd: 3}\n", "a.yaml:1: rewards.rnd: found '3', expected a mapping"),
+        (
+            "rewards:\n  task: null\n",
+            "a.yaml:2: rewards.task: found nothing, expected a mapping such as {gamma: 0.99}: no run is without the task's own reward",
+        ),
+        (
+            "tasks:\n  Hoper: {ppo: {lr: 1}}\n",
+            "a.yaml:2: tasks.Hoper: found 'Hoper', expected the name of a task; `marathon list` shows all; did you mean 'Hopper-v0'?",
+        ),
+        (
+            "tasks:\n  Hopper: {}\n  xyzzy: {}\n",
+            "a.yaml:3: tasks.xyzzy: found 'xyzzy', expected the name of a task; `marathon list` shows all",
+        ),
+        ("tasks: {dog.xml: {}}\n", "tasks.dog.xml: found 'dog.xml', expected the name of a task"),
+        ("sac: {replay: 1e12}\n", "a.yaml:1: sac.replay: found '1e12', expected a whole number up to 2147483648"),
+        ("run: {agents: 1e30}\n", "a.yaml:1: run.agents: found '1e30', expected a whole number up to 2147483648"),
+        (
+            "run:\n  horizon: 100000000\n",
+            "a.yaml:2: run.horizon: found 100000000, expected at most 16777216 with 128 agents",
+        ),
+        ("run: {rollouts: 1e7}\n", "a.yaml:1: run.rollouts: found '1e7', expected a whole number up to 1000000"),
+        ("ppo: {epochs: 1001}\n", "a.yaml:1: ppo.epochs: found '1001', expected a whole number up to 1000"),
+        (
+            "run: {total_steps: 1.5}\n",
+            "a.yaml:1: run.total_steps: found '1.5', expected a whole number above 0, also as 8e6, 500k or 8M",
+        ),
+        (
+            "run: {total_steps: 1e30}\n",
+            "a.yaml:1: run.total_steps: found '1e30', expected a whole number from 1 to 9007199254740992",
+        ),
         (
             "rewards:\n  amp:\n    share: 2\n",
             "a.yaml:3: rewards.amp.share: found 2, expected a number above 0 and at most 1",
@@ -187,6 +216,34 @@ fn what_is_wrong_is_refused_with_its_line() {
     }
     let wrong = set(default_for("hopper"), "ppo.lr=[1]").unwrap_err().to_string();
     assert_eq!(wrong, "--set: ppo.lr: found a list, expected a positive number");
+    let wrong = set(default_for("hopper"), "rewards.task=null").unwrap_err().to_string();
+    assert!(wrong.starts_with("--set: rewards.task: found nothing"), "{wrong}");
+    // a section of files
+    let wrong = set(default_for("hopper"), "behaviors.Hopper=1").unwrap_err().to_string();
+    assert!(
+        wrong.starts_with("--set: behaviors: unknown key; expected one of") && !wrong.contains(", behaviors"),
+        "{wrong}"
+    );
+}
+
+#[test]
+fn steps_have_short_forms() {
+    for (text, steps) in [("8M", 8_000_000), ("500k", 500_000), ("2.5e6", 2_500_000), ("1_000", 1000)] {
+        let loaded = set(default_for("hopper"), &format!("run.total_steps={text}")).unwrap();
+        assert_eq!(loaded.config.run.total_steps, steps, "{text}");
+    }
+    assert_eq!(read("run: {total_steps: 4.35M}\nsummary_freq: 10k", "hopper").summary_freq, 10_000);
+    // other numbers have none
+    assert!(set(default_for("hopper"), "run.agents=1k").is_err());
+}
+
+#[test]
+fn any_name_of_a_task_finds_its_section() {
+    let steps = |text: &str, task: &str| read(text, task).config.run.total_steps;
+    let text = "run: {total_steps: 5}\ntasks: {walker: {run: {total_steps: 7}}, ant: {run: {total_steps: 9}}}";
+    assert_eq!(["Walker2d-v0", "Ant", "hopper"].map(|task| steps(text, task)), [7, 9, 5]);
+    // a task that a program has made
+    assert_eq!(steps("tasks: {MyRobot-v3: {run: {total_steps: 3}}}", "MyRobot-v3"), 3);
 }
 
 /// The settings of every preset, on a line each: a change of the files, the defaults or the reader shows here.
@@ -210,7 +267,8 @@ fn presets_are_what_they_were() {
         }
         for id in marathon_envs::ids() {
             let Ok(loaded) = parse(&file, &std::fs::read(&file).unwrap(), &id) else { continue };
-            if !loaded.notes.iter().any(|note| note.starts_with("nothing about")) {
+            let is_other = |note: &String| note.starts_with("nothing about") || note.starts_with("'tasks' has no");
+            if !loaded.notes.iter().any(is_other) {
                 line(&format!("{name} {id}"), &loaded);
             }
         }

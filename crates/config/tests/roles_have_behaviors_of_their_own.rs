@@ -46,7 +46,7 @@ fn a_role_that_there_is_not_is_refused_by_name() {
     let file = FILE.replace("Tag-v0/opponent", "TerrainWalker2d-v0/bilder").replace("Tag-v0", "TerrainWalker2d-v0");
     let config = parse(path(), file.as_bytes(), "TerrainWalker2d-v0").unwrap().config;
     let error = config.check_roles(spec.spec()).unwrap_err().to_string();
-    assert_eq!(error, "configuration: roles is bilder, expected runner, builder");
+    assert_eq!(error, "configuration: roles is bilder, expected runner, builder; did you mean 'builder'?");
 }
 
 #[test]

@@ -91,4 +91,4 @@ pub use trainer::memory::can_be_had;
 pub use trainer::observer::{Control, Observer, Snapshot};
 pub use trainer::remote::{Deliver, Player, Players};
 pub use trainer::stats::{IterationStats, Learned};
-pub use trainer::{TrainLoop, TrainOutput, train, train_with};
+pub use trainer::{TrainLoop, TrainOutput, check_demonstrations, train, train_with};

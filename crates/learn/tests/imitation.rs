@@ -261,13 +261,17 @@ fn what_cannot_be_imitated_is_refused() {
         task
     };
     let none = Unrewarded { demonstrations: None, ..Unrewarded::new(20) };
-    refused(&none, |_| {}, "imitation is for Puck-v0, which has no demonstrations, expected an agent that follows");
+    refused(
+        &none,
+        |_| {},
+        "rewards.amp.demonstrations is null, expected a .demo file: Puck-v0 has no motion clips to imitate",
+    );
     refused(
         &whole,
         |i| i.demonstrations = Some("puck.demo".into()),
         "imitation is for those of the task's own, expected those of 'puck.demo'",
     );
-    refused(&with(|d| d.motions.clear()), |_| {}, "which has no demonstrations");
+    refused(&with(|d| d.motions.clear()), |_| {}, "Puck-v0 has no motion clips to imitate");
     refused(&with(|d| d.act_len = 0), |i| i.actions = true, "clips, which have no actions, expected 2 actions");
     refused(&with(|d| d.obs_len = 3), |_| {}, "demonstrations of 3 observed numbers, expected 6");
 }

@@ -392,7 +392,7 @@ fn what_does_not_suit_the_roles_is_refused() {
         let own = c.roles.remove("opponent").unwrap();
         c.roles.insert("oponent".into(), own);
     });
-    assert_eq!(unknown, "configuration: roles is oponent, expected runner, opponent");
+    assert_eq!(unknown, "configuration: roles is oponent, expected runner, opponent; did you mean 'opponent'?");
     let sac = refused(true, |c| {
         let own = c.roles.get_mut("opponent").unwrap();
         own.algorithm = Algorithm::Sac(Sac::default());

@@ -1,6 +1,7 @@
 //! Configuration files on disk.
 
 use crate::error::RunError;
+use crate::task_config::{TaskConfig, TaskOptions};
 use marathon_config::{Loaded, default_for, default_of, parse, set};
 use marathon_envs::registry;
 use marathon_physics::budget;
@@ -37,6 +38,16 @@ pub fn of(task: &str, file: Option<&Path>, algorithm: Option<&str>, settings: &[
         (None, None) => default_for(task),
     };
     with(loaded, settings)
+}
+
+/// Refuses options and roles that a task does not have, as a run does.
+///
+/// # Errors
+/// Names the option or role and the nearest.
+pub fn check(loaded: &Loaded, task: TaskConfig) -> Result<(), RunError> {
+    let task = task.with(&TaskOptions { given: loaded.options.clone() })?;
+    let roles = registry::global().agent_with(&task.agent, &task.options)?.facts().roles;
+    Ok(loaded.config.check_role_names(&roles.iter().map(|role| role.name.as_str()).collect::<Vec<_>>())?)
 }
 
 /// A configuration with settings `KEY=VALUE` over it.

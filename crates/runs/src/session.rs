@@ -20,7 +20,7 @@ use marathon_config::Loaded;
 use marathon_envs::ShardFactory;
 use marathon_learn::{
     Checkpoint, EvalOptions, Evaluation, IterationStats, Observer, Players, Policy, Progress, Schedule, Snapshot,
-    TrainConfig, TrainOutput, evaluate_roles, initialized, train_with,
+    TrainConfig, TrainOutput, check_demonstrations, evaluate_roles, initialized, train_with,
 };
 use marathon_physics::budget;
 use marathon_physics::lanes::Isa;
@@ -123,6 +123,7 @@ impl Session {
         loaded.config.check_roles(factory.spec())?;
         inputs::name_wholly(&mut loaded.config);
         let factory = with_demonstrations(factory, &loaded.config)?;
+        check_demonstrations(&loaded.config, &*factory)?;
         loaded.summary_freq = loaded.summary_freq.max(1);
         loaded.checkpoint_interval = loaded.checkpoint_interval.max(1);
         let mut run = RunFile::new(&task_config, &loaded);

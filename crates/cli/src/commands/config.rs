@@ -7,7 +7,7 @@ use marathon_learn::write_atomic;
 use marathon_physics::budget;
 use marathon_runs::terminal::{self, print_json, say};
 use marathon_runs::text::path_word;
-use marathon_runs::{RunError, configuration, output};
+use marathon_runs::{RunError, TaskConfig, configuration, output};
 
 /// Shows or converts.
 ///
@@ -23,9 +23,10 @@ pub fn run(command: &ConfigCommand, json: bool) -> Result<(), CliError> {
 /// Prints what a run would be trained with.
 fn show(args: &ShowArgs, json: bool) -> Result<(), CliError> {
     let ShowArgs { task, config, algo, set } = args;
-    let id = marathon_envs::agent(task)?.facts().id;
-    let loaded = configuration::of(&id, config.as_deref(), algo.as_deref(), set)?;
-    loaded.notes.iter().for_each(|note| terminal::note(format!("note: {note}")));
+    let task = TaskConfig::named(task)?;
+    let loaded = configuration::of(&task.agent, config.as_deref(), algo.as_deref(), set)?;
+    configuration::check(&loaded, task)?;
+    terminal::notes(loaded.notes.clone());
     match json {
         true => print_json(&loaded.document()),
         false => say(loaded.to_yaml().trim_end()),
@@ -38,7 +39,7 @@ fn converted(args: &ConvertArgs, json: bool) -> Result<(), CliError> {
     let ConvertArgs { file, out } = args;
     let bytes = budget::read(file, &budget::CONFIG_FILE).map_err(RunError::io(file, "read"))?;
     let (text, notes) = convert(file, &bytes)?;
-    notes.iter().for_each(|note| terminal::note(format!("note: {note}")));
+    terminal::notes(notes.clone());
     match out {
         Some(out) => {
             output::check(out, &["yaml", "yml"], &[file])?;

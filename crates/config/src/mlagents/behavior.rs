@@ -70,7 +70,10 @@ pub fn select<'a>(
         return Ok(behaviors.section(name)?.above(default));
     }
     if !default.is_empty() {
-        notes.0.push(format!("nothing about {agent} itself: {default_name} applies"));
+        // without an agent, the caller asks for what serves all
+        if !agent.is_empty() {
+            notes.0.push(format!("nothing about {agent} itself: {default_name} applies"));
+        }
         return Ok(default);
     }
     let accepted = names::accepted(agent);

@@ -6,8 +6,8 @@ use crate::error::ConfigError;
 use crate::loaded::Loaded;
 use crate::section::{Range, Section};
 use marathon_learn::{
-    A2c, Acktr, Algorithm, BLOCK, LrSchedule, NetworkConfig, Ppo, RewardConfig, RewardKind, RunConfig, Sac, Schedule,
-    StatisticsConfig, TrainConfig,
+    A2c, Acktr, Algorithm, BLOCK, Error, LrSchedule, NetworkConfig, Ppo, RewardConfig, RewardKind, RunConfig, Sac,
+    Schedule, StatisticsConfig, TrainConfig,
 };
 use std::path::Path;
 
@@ -26,7 +26,8 @@ const LAST_EPSILON: f64 = 0.1;
 /// If a value is wrong, or the values do not go together.
 pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigError> {
     let settings = Settings::read(&behavior)?;
-    let Behavior { top, hyperparameters, mut notes, seed, base, signals, extrinsic, steps_per_agent, .. } = behavior;
+    let Behavior { top, hyperparameters, network, mut notes, seed, base, signals, extrinsic, steps_per_agent, .. } =
+        behavior;
     let strength = extrinsic.number("strength", Range::Positive, 1.0)?;
     let agents = agents(&settings, &base, steps_per_agent);
     // an update waits until the buffer is full
@@ -81,7 +82,7 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
         algorithm,
         roles: Default::default(),
     };
-    config.validate().map_err(|source| ConfigError::Combination { path: path.into(), source })?;
+    config.validate().map_err(|source| misfit(source, path, [&top, &hyperparameters, &network]))?;
     Ok(Loaded {
         config,
         options: Vec::new(),
@@ -91,6 +92,35 @@ pub fn convert(path: &Path, behavior: Behavior<'_>) -> Result<Loaded, ConfigErro
         keep_checkpoints: settings.keep_checkpoints as usize,
         notes: notes.0,
     })
+}
+
+/// Keys of ML-Agents, by the last names of the settings that they become.
+const KEYS: [(&str, &str); 13] = [
+    ("batch", "batch_size"),
+    ("minibatches", "batch_size"),
+    ("replay", "buffer_size"),
+    ("horizon", "buffer_size"),
+    ("warmup", "buffer_init_steps"),
+    ("epochs", "num_epoch"),
+    ("lr", "learning_rate"),
+    ("clip", "epsilon"),
+    ("entropy_coef", "beta"),
+    ("gae_lambda", "lambd"),
+    ("init_alpha", "init_entcoef"),
+    ("hidden", "hidden_units"),
+    ("total_steps", "max_steps"),
+];
+
+/// An error of settings that do not go together, at the file's own key if it has set the one that is at fault.
+fn misfit(error: Error, path: &Path, sections: [&Section<'_>; 3]) -> ConfigError {
+    if let Error::Config { field, expected, .. } = &error {
+        let last = field.rsplit('.').next().unwrap_or(field);
+        let key = KEYS.iter().find(|(setting, _)| *setting == last).map_or(last, |(_, key)| key);
+        if let Some(entry) = sections.into_iter().find_map(|section| section.set(key)) {
+            return ConfigError::value(entry.place, entry.node.describe(), expected);
+        }
+    }
+    ConfigError::Combination { path: path.into(), source: error }
 }
 
 /// As many agents as fill the buffer with one stretch of `time_horizon` decisions each.

@@ -2,6 +2,7 @@
 
 use super::behavior::{Behavior, Format};
 use crate::error::ConfigError;
+use crate::keys::MOST_EPOCHS;
 use crate::section::{Range, Section};
 use marathon_learn::Algorithm;
 
@@ -94,7 +95,7 @@ impl Settings {
             epsilon: hyperparameters.number("epsilon", Range::Positive, epsilon)?,
             epsilon_schedule: decay(hyperparameters, "epsilon_schedule", learning_rate_schedule)?,
             lambd: hyperparameters.number("lambd", Range::Fraction, lambd)?,
-            num_epoch: hyperparameters.count("num_epoch", 1..=100_000, epochs as u64)?,
+            num_epoch: hyperparameters.count("num_epoch", 1..=MOST_EPOCHS, epochs as u64)?,
             normalize: network.flag("normalize", base.statistics.normalize_observations)?,
             hidden_units: network.count(
                 "hidden_units",

@@ -16,10 +16,10 @@ pub fn widen(net: &Mlp, params: &mut [f32], small: &Mlp, of_small: &[f32], sees:
     let hidden = |sizes: &[usize]| format!("{:?}", &sizes[1..sizes.len() - 1]);
     let wide = sizes.len() == others.len() && sizes[1..].iter().zip(&others[1..]).all(|(a, b)| a >= b);
     if !wide || sizes.last() != others.last() {
-        let what = "hidden layers of the policy to start from".into();
+        let what = "the policy to start from".into();
         return Err(Error::Mismatch {
             what,
-            found: hidden(others),
+            found: format!("hidden layers {}", hidden(others)),
             expected: format!("{} or narrower", hidden(sizes)),
         });
     }

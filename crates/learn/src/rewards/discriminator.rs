@@ -153,8 +153,9 @@ impl Imitation {
         self.sees(spec)?;
         let what = |found: String, expected: String| Err(Error::Mismatch { what: "imitation".into(), found, expected });
         let Some(all) = demonstrations.filter(|all| all.motions.iter().any(|motion| !motion.is_empty())) else {
-            let expected = "an agent that follows motion clips, or a file of demonstrations (demo_path)".into();
-            return what(format!("{}, which has no demonstrations", spec.id), expected);
+            let expected = format!("a .demo file: {} has no motion clips to imitate", spec.id);
+            let key = format!("rewards.{}.demonstrations", self.form.name());
+            return Err(Error::config(key, "null", expected));
         };
         if all.source != self.demonstrations {
             let name = |source: &Option<String>| match source {

@@ -12,6 +12,7 @@ use crate::nets::activation::Activation;
 use crate::rewards::{RewardConfig, RewardKind, document};
 use crate::rollout::statistics::StatisticsConfig;
 use marathon_envs::{Demonstrations, Spec};
+use marathon_physics::hint::{did_you_mean, nearest};
 use marathon_physics::lanes::Isa;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -19,6 +20,8 @@ use std::path::Path;
 
 /// Most steps of a run: as many as double precision can count.
 pub(crate) const MAX_STEPS: u64 = 1 << 53;
+/// Most agent-steps of a rollout.
+const MOST_SAMPLES: usize = 1 << 31;
 
 /// Settings of training. Every field has a default, so a file names only what it changes. In files, the settings of the
 /// algorithm stand under its name, and those of each reward under its.
@@ -301,8 +304,13 @@ impl RunConfig {
             return Err(Error::config("agents", self.agents, expected));
         }
         let samples = self.blocks().saturating_mul(self.horizon).saturating_mul(BLOCK);
-        if samples > 1 << 31 {
-            return Err(Error::config("agents * horizon", samples, "at most 2^31 samples"));
+        if samples > MOST_SAMPLES {
+            let lanes = self.blocks().saturating_mul(BLOCK);
+            if lanes > MOST_SAMPLES {
+                return Err(Error::config("agents", self.agents, format!("at most {MOST_SAMPLES}")));
+            }
+            let expected = format!("at most {} with {} agents", MOST_SAMPLES / lanes, self.agents);
+            return Err(Error::config("horizon", self.horizon, expected));
         }
         if self.total_steps > MAX_STEPS {
             return Err(Error::config("total_steps", self.total_steps, format!("at most {MAX_STEPS}")));
@@ -382,11 +390,19 @@ impl TrainConfig {
     /// # Errors
     /// Names the role and those that there are.
     pub fn check_roles(&self, spec: &Spec) -> Result<(), Error> {
-        let mut unknown = self.roles.keys().filter(|name| !spec.roles.iter().any(|role| role.name == **name));
+        self.check_role_names(&spec.roles.iter().map(|role| role.name.as_str()).collect::<Vec<_>>())
+    }
+
+    /// The same with the names of the task's roles; a task with one role has none.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn check_role_names(&self, names: &[&str]) -> Result<(), Error> {
+        let mut unknown = self.roles.keys().filter(|name| !names.contains(&name.as_str()));
         let Some(name) = unknown.next() else { return Ok(()) };
-        let names: Vec<&str> = spec.roles.iter().map(|role| role.name.as_str()).collect();
         let expected = if names.is_empty() { "none: the task has one role".into() } else { names.join(", ") };
-        Err(Error::config("roles", name, expected))
+        let near = did_you_mean(nearest(name, names.iter().copied()));
+        Err(Error::config("roles", name, format!("{expected}{near}")))
     }
 
     /// The same as [`Self::validate`] for a configuration in a file, under `key`.

@@ -53,6 +53,8 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use workers::{Crew, Worker};
 
+pub use roles::check_demonstrations;
+
 /// Result of a finished run.
 #[derive(Debug)]
 pub struct TrainOutput {

@@ -26,6 +26,14 @@ pub struct RoleParts {
     demonstrations: Option<Demonstrations>,
 }
 
+/// Refuses rewards for imitation without demonstrations, and demonstrations that do not fit a task.
+///
+/// # Errors
+/// Names the setting, what was found and what is valid.
+pub fn check_demonstrations(config: &TrainConfig, task: &dyn ShardFactory) -> Result<(), Error> {
+    RoleParts::all(config, task.spec())?.iter_mut().try_for_each(|role| role.learn_from(task))
+}
+
 impl RoleParts {
     /// All roles of a task.
     ///

@@ -27,6 +27,11 @@ pub fn note(text: impl AsRef<str>) {
     let _ = writeln!(stderr(), "{}", printable(text.as_ref()));
 }
 
+/// Prints notes for the user on stderr.
+pub fn notes(all: impl IntoIterator<Item = String>) {
+    all.into_iter().for_each(|text| note(format!("note: {text}")));
+}
+
 /// Prints the one JSON object of `--json`.
 pub fn print_json(document: &impl Serialize) {
     match serde_json::to_string_pretty(document) {

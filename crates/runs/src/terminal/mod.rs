@@ -4,5 +4,5 @@ mod console;
 mod exit;
 pub mod interrupt;
 
-pub use console::{note, print_json, say};
+pub use console::{note, notes, print_json, say};
 pub use exit::{failed, finish, refused};
