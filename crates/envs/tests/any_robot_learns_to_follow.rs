@@ -221,6 +221,6 @@ fn wheels_are_no_feet() {
         assert!(rig.to_string().contains("feet       none: it rolls on w0, w1, w2, w3"), "{rig}");
     }
     // a paddle turns as well, but does not roll
-    assert_eq!(cart("motor", "type='box' size='.1 .02 .03'").feet.len(), 4);
+    assert_eq!(cart("motor", "type='box' size='.02 .1 .03'").feet.len(), 4);
     assert_eq!(cart("motor", "type='cylinder' size='.1 .03' pos='0 0 -.05'").feet.len(), 4);
 }
