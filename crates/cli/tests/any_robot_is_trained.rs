@@ -38,3 +38,41 @@ fn the_path_of_a_model_is_a_task() {
     assert!(!refused.status.success() && said.contains("cat.xml") && said.contains("cannot read"), "{said}");
     assert!(!here.join("none").exists());
 }
+
+#[test]
+fn the_model_that_is_named_is_used() {
+    let temp = tempfile::tempdir().unwrap();
+    let path = temp.path();
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/robots/hexapod.xml");
+    let text = std::fs::read_to_string(shipped).unwrap();
+    let (old, new) = (path.join("old.xml"), path.join("new.xml"));
+    [&old, &new].iter().for_each(|file| std::fs::write(file, &text).unwrap());
+    succeed(path, &["train", "old.xml", "--agents", "64", "--steps", "4096", "--out", "run"]);
+    let eval = ["eval", "run", "--episodes", "1"];
+    let said = |words: &[&str]| stderr(&run(path, words));
+    assert!(!said(&eval).contains("note:"), "{}", said(&eval));
+
+    // another version of the model
+    std::fs::write(&old, format!("{text}<!-- heavier -->")).unwrap();
+    let render = ["render", "run", "--out", "run.png", "--seconds", "0.1"];
+    for words in [&eval[..], &["eval", "run/policy.safetensors", "--episodes", "1"], &render] {
+        assert!(said(words).contains("old.xml has changed since the policy was trained"), "{}", said(words));
+    }
+    // the model of the command line has no need of the old one
+    std::fs::remove_file(&old).unwrap();
+    assert!(fail(path, 1, &eval).contains("old.xml"));
+    let other = [&eval[..], &["--agent", "new.xml"]].concat();
+    succeed(path, &other);
+    assert!(!said(&other).contains("note:"), "{}", said(&other));
+
+    for words in [&["train", "new.xml", "--out", "two"][..], &other] {
+        let text = fail(path, 2, &[words, &["--option", "xml_file=old.xml"]].concat());
+        assert!(text.contains("--option xml_file=old.xml and the task new.xml name two models"), "{text}");
+    }
+    assert!(!path.join("two").exists());
+
+    let listed = succeed(path, &["list", "new.xml"]);
+    assert_eq!(listed.lines().filter(|line| *line == "command").count(), 1, "{listed}");
+    let speed = listed.lines().find(|line| line.ends_with("speed m/s")).expect("a speed");
+    assert!(speed.trim().len() < 30, "{speed}");
+}

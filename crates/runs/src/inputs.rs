@@ -4,15 +4,15 @@
 
 use crate::error::RunError;
 use crate::folder::policy_path;
-use crate::run_file::Inputs;
+use crate::run_file::{Inputs, RunFile};
 use crate::task_config::TaskConfig;
-use crate::text::whole;
+use crate::text::{path_word, whole};
 use marathon_envs::ModelSource;
 use marathon_learn::{TrainConfig, checksum};
 use marathon_physics::Model;
 use marathon_physics::budget::{self, Limit};
 use std::cell::RefCell;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Makes the paths of a configuration's demonstrations absolute.
 pub fn name_wholly(config: &mut TrainConfig) {
@@ -76,6 +76,19 @@ pub fn of_start(policy: &Path) -> Result<String, RunError> {
 /// If a file has changed or cannot be read.
 pub fn check(inputs: &Inputs) -> Result<(), RunError> {
     inputs.iter().try_for_each(|(path, expected)| agree(path, &sum(path, &budget::DEMONSTRATION_FILE)?, expected))
+}
+
+/// A note about the model of a task that has changed, or is gone, since the run began that a policy is from. `given`: the folder
+/// of the run, or a policy in it. `None` for a model that the run did not use.
+pub fn changed(given: &Path, task_config: &TaskConfig) -> Option<String> {
+    let folder = if given.is_dir() { given } else { given.parent()? };
+    let run = RunFile::read(&folder.join("run.json")).ok()?;
+    let model = task_config.model()?.file()?.to_path_buf();
+    run.files.get(&whole(&model))?;
+    let is_other = |path: &&PathBuf| sum(path, &budget::DEMONSTRATION_FILE).ok().as_ref() != run.files.get(*path);
+    let changed = of_model(&model).ok()?.into_keys().chain([model]).collect::<Vec<_>>();
+    let path = changed.iter().find(is_other)?;
+    Some(format!("{} has changed since the policy was trained", path_word(path)))
 }
 
 /// Refuses an initial policy that has changed since the run began.

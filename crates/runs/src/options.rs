@@ -2,6 +2,7 @@
 //! command-line arguments, with these texts as the help.
 
 use crate::error::RunError;
+use crate::inputs;
 use crate::policy_file;
 use crate::task_config::TaskOptions;
 use marathon_envs::ShardFactory;
@@ -111,7 +112,7 @@ impl RunOptions {
 pub struct PolicySource {
     /// Policy file (.safetensors or .onnx) or folder of a run.
     pub policy: PathBuf,
-    /// Task of the policy [default: the task that it was trained for].
+    /// Task of the policy, or the path of another model for a policy of Robot-v0 [default: the task that it was trained for].
     #[cfg_attr(feature = "clap", arg(long, value_name = "AGENT"))]
     pub agent: Option<String>,
     /// Options of the task that differ from those of the policy's training.
@@ -126,6 +127,11 @@ impl PolicySource {
     /// If there is no such file, it is no policy, it is for another agent, or the agent does not take the arguments.
     pub fn load(&self) -> Result<(Policy, Arc<dyn ShardFactory>), RunError> {
         policy_file::load(&self.policy, self.agent.as_deref(), &self.task)
+    }
+
+    /// A note for the user if the model of a run's task has changed since the run began.
+    pub fn note(&self) -> Option<String> {
+        inputs::changed(&self.policy, &policy_file::task_for(&self.policy, self.agent.as_deref(), &self.task).ok()?)
     }
 
     /// The same with the policies of all roles of the task, in their order; those of the others lie beside the first one.
@@ -179,22 +185,15 @@ impl VideoOptions {
     }
 }
 
+/// Most steps on a command line.
+#[cfg(feature = "clap")]
+const MOST_STEPS: u64 = 1_000_000_000_000_000;
+
 /// A number of steps, with `_` or `,` between digits, or in the short forms `500k`, `2.5M`, `1e6`.
 #[cfg(feature = "clap")]
 pub(crate) fn parse_steps(text: &str) -> Result<u64, String> {
-    let bad = || "expected a positive number of steps such as 4000000, 4_000_000, 4M, 500k or 4e6".to_string();
-    let digits: String = text.chars().filter(|c| !matches!(c, '_' | ',')).collect();
-    if let Ok(n) = digits.parse::<u64>() {
-        return if n > 0 { Ok(n) } else { Err(bad()) };
-    }
-    let (number, factor) = match digits.chars().last() {
-        Some('k' | 'K') => (&digits[..digits.len() - 1], 1e3),
-        Some('m' | 'M') => (&digits[..digits.len() - 1], 1e6),
-        Some('g' | 'G') => (&digits[..digits.len() - 1], 1e9),
-        _ => (&digits[..], 1.0),
-    };
-    let steps = number.parse::<f64>().map_err(|_| bad())? * factor;
-    if (1.0..=1e15).contains(&steps) { Ok(steps.round() as u64) } else { Err(bad()) }
+    let steps = marathon_config::steps(text).filter(|steps| (1..=MOST_STEPS).contains(steps));
+    steps.ok_or_else(|| "expected a positive whole number of steps such as 4000000, 4_000_000, 4M, 500k or 4e6".into())
 }
 
 #[cfg(all(test, feature = "clap"))]
@@ -203,11 +202,16 @@ mod tests {
 
     #[test]
     fn steps_have_short_forms() {
-        for (text, steps) in [("4000000", 4_000_000), ("4_000_000", 4_000_000), ("2.5M", 2_500_000), ("1e6", 1_000_000)]
-        {
+        for (text, steps) in [
+            ("4000000", 4_000_000),
+            ("4_000_000", 4_000_000),
+            ("2.5M", 2_500_000),
+            ("1e6", 1_000_000),
+            ("4.35M", 4_350_000),
+        ] {
             assert_eq!(parse_steps(text), Ok(steps));
         }
-        for text in ["0", "-3", "many", "", "inf", "nan", "k"] {
+        for text in ["0", "-3", "1.5", "0.4k", "1e16", "many", "", "inf", "nan", "k"] {
             assert!(parse_steps(text).is_err(), "{text}");
         }
     }

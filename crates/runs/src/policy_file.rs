@@ -74,11 +74,23 @@ pub fn load_all(
     Ok((policies, factory))
 }
 
-/// The task for a policy.
+/// The task that a policy plays in. The user's task and options have precedence over those of the file.
+///
+/// # Errors
+/// If there is no such file, it is not a policy, or there is no such task.
+pub fn task_for(given: &Path, agent: Option<&str>, options: &TaskOptions) -> Result<TaskConfig, RunError> {
+    task_config(given, agent, options, Policy::load)
+}
+
 fn task_config(given: &Path, agent: Option<&str>, options: &TaskOptions, load: Load) -> Result<TaskConfig, RunError> {
     let noted = task_with(given, load)?;
-    let task_config = match (agent.map(TaskConfig::named).transpose()?, noted) {
-        (Some(asked), Some(noted)) if noted.agent == asked.agent => noted,
+    let asked = agent.map(TaskConfig::named).transpose()?;
+    if let (Some(name), Some(asked)) = (agent, &asked) {
+        asked.check_model(name, options)?;
+    }
+    let task_config = match (asked, noted) {
+        // the path of a model is an option of the task
+        (Some(asked), Some(noted)) if noted.agent == asked.agent => noted.overlay(&asked),
         (Some(asked), _) => asked,
         (None, Some(noted)) => noted,
         // the message says what is missing

@@ -10,6 +10,8 @@ type Make<'a> = Box<dyn FnOnce(usize) -> Result<Arc<dyn ShardFactory>, RunError>
 /// A task whose environments do not exist yet.
 pub struct Task<'a> {
     task_config: TaskConfig,
+    /// The name that the user gave it.
+    name: Option<String>,
     /// Factory of a task that a front end creates.
     make: Option<Make<'a>>,
 }
@@ -20,17 +22,17 @@ impl<'a> Task<'a> {
     /// # Errors
     /// If the task does not exist. The text names the nearest.
     pub fn named(name: &str) -> Result<Self, RunError> {
-        Ok(Self::set(TaskConfig::named(name)?))
+        Ok(Task { name: Some(name.into()), ..Self::set(TaskConfig::named(name)?) })
     }
 
     /// A registered task with its options.
     pub fn set(task_config: TaskConfig) -> Self {
-        Task { task_config, make: None }
+        Task { task_config, name: None, make: None }
     }
 
     /// A task of a front end. `make` gets the number of agents of the run.
     pub fn made(id: String, make: impl FnOnce(usize) -> Result<Arc<dyn ShardFactory>, RunError> + 'a) -> Self {
-        Task { task_config: TaskConfig { agent: id, ..TaskConfig::default() }, make: Some(Box::new(make)) }
+        Task { task_config: TaskConfig { agent: id, ..TaskConfig::default() }, name: None, make: Some(Box::new(make)) }
     }
 
     /// Whether a front end creates the task.
@@ -48,6 +50,9 @@ impl<'a> Task<'a> {
     /// # Errors
     /// If the task does not take them, or a file that they name cannot be read.
     pub fn with(self, options: &TaskOptions) -> Result<Self, RunError> {
+        if let Some(name) = &self.name {
+            self.task_config.check_model(name, options)?;
+        }
         match self.make {
             _ if options.given.is_empty() => Ok(self),
             None => Ok(Self::set(self.task_config.with(options)?)),
@@ -63,7 +68,7 @@ impl<'a> Task<'a> {
     /// # Errors
     /// If they cannot be created.
     pub fn factory(self, agents: usize) -> Result<(Arc<dyn ShardFactory>, TaskConfig), RunError> {
-        let Task { mut task_config, make } = self;
+        let Task { mut task_config, make, .. } = self;
         let factory = match make {
             Some(make) => make(agents)?,
             None => {

@@ -10,6 +10,7 @@ use marathon_learn::PolicyMeta;
 use marathon_learn::policy::options;
 use marathon_physics::lanes::Isa;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 use std::sync::Arc;
 
 /// The argument that names motion clips.
@@ -102,6 +103,28 @@ impl TaskConfig {
             self.options.set(XML, Value::Text(whole(path).to_string_lossy().into_owned()));
         }
         Ok(self)
+    }
+
+    /// Refuses an option that names another model than the task's own name does, which is the path of a model.
+    ///
+    /// # Errors
+    /// Names both models.
+    pub fn check_model(&self, name: &str, options: &TaskOptions) -> Result<(), RunError> {
+        let (Some(own), Some((_, other))) =
+            (registry::robot_options(name), options.given.iter().rev().find(|(known, _)| known == XML))
+        else {
+            return Ok(());
+        };
+        let text = |value: &Value| match value {
+            Value::Text(text) => text.clone(),
+            value => value.to_string(),
+        };
+        let other = text(other);
+        if own.get(XML).is_some_and(|own| whole(Path::new(&text(own))) == whole(Path::new(&other))) {
+            return Ok(());
+        }
+        let problem = format!("{XML}={other} and the task {name} name two models, expected one of them");
+        Err(RunError::option("option", problem))
     }
 
     /// The source of the task's model. `None` if the task does not take its arguments; creating its environments

@@ -5,7 +5,7 @@ use crate::error::CliError;
 use marathon_learn::{EvalOptions, Evaluation, Policy, evaluate_roles};
 use marathon_physics::lanes::Isa;
 use marathon_runs::report::summary;
-use marathon_runs::terminal::{print_json, say};
+use marathon_runs::terminal::{self, print_json, say};
 use marathon_runs::{Imitation, imitation};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -28,6 +28,7 @@ struct Report<'a> {
 /// If there is no such policy, or it is for another agent.
 pub fn run(args: &EvalArgs, json: bool) -> Result<(), CliError> {
     let (policies, factory) = args.source.load_all()?;
+    terminal::notes(args.source.note());
     let options = EvalOptions { episodes: args.episodes as usize, seed: args.seed, threads: args.threads };
     let all: Vec<&Policy> = policies.iter().collect();
     let results = evaluate_roles(&*factory, Isa::best(), &all, &options)?;

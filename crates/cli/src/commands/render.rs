@@ -4,8 +4,8 @@ use crate::args::RenderArgs;
 use crate::error::CliError;
 use crate::video::{Cast, Shot, shoot};
 use marathon_physics::budget::MEMORY;
-use marathon_render::Format;
-use marathon_runs::terminal::{interrupt, print_json, say};
+use marathon_render::{Format, MAX_SIDE};
+use marathon_runs::terminal::{self, interrupt, print_json, say};
 use marathon_runs::{PolicySource, output};
 use std::path::Path;
 
@@ -22,6 +22,7 @@ pub fn run(args: &RenderArgs, json: bool) -> Result<(), CliError> {
     let shot = shot(args)?;
     output::check(&args.out, &["png", "gif", "mp4"], &[&args.source.policy])?;
     let (policies, factory) = args.source.load_all()?;
+    terminal::notes(args.source.note());
     let cast = Cast { agents: args.agents, seed: args.seed, start: args.video.start, ghost: args.ghost };
     interrupt::install("leaving without a picture")?;
     let report = shoot(&policies, factory.spec(), &shot, &cast, &args.out)?;
@@ -63,6 +64,11 @@ fn shot(args: &RenderArgs) -> Result<Shot, CliError> {
     let frames = args.frames.unwrap_or(8);
     let usage = |text: String| Err(CliError::Usage(text));
     args.video.validate()?;
+    for (name, pixels) in [("width", width), ("height", height)] {
+        if !(1..=MAX_SIDE).contains(&pixels) {
+            return usage(format!("--{name} is {pixels}, expected 1 to {MAX_SIDE} pixels"));
+        }
+    }
     if !(1..=1000).contains(&frames) {
         return usage(format!("--frames is {frames}, expected 1 to 1000"));
     }
