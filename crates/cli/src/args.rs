@@ -3,10 +3,11 @@
 use crate::bench::BenchArgs;
 use crate::motion::MotionArgs;
 use crate::video::Ghost;
-use clap::{Parser, Subcommand};
+use clap::{Arg, CommandFactory, Parser, Subcommand};
 use marathon_learn::Algorithm;
 use marathon_runs::distill::DistillOptions;
 use marathon_runs::{PolicySource, RunOptions, TaskOptions, VideoOptions};
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -36,6 +37,28 @@ pub struct Args {
     /// Command to run.
     #[command(subcommand)]
     pub command: Command,
+}
+
+/// Parser of a whole number in a range, with the short forms of `--steps`.
+pub fn count<N: TryFrom<u64>>(range: RangeInclusive<u64>) -> impl Fn(&str) -> Result<N, String> + Clone {
+    move |text| {
+        let number = marathon_config::steps(text).filter(|number| range.contains(number));
+        number.and_then(|number| number.try_into().ok()).ok_or_else(|| match (range.start(), range.end()) {
+            (0, &u64::MAX) => "expected a whole number such as 1000 or 1e3".into(),
+            (least, most) => format!("expected a whole number from {least} to {most}"),
+        })
+    }
+}
+
+/// The command line as clap knows it. An option takes a negative number as its value and refuses it by name.
+pub fn command() -> clap::Command {
+    with_negative_numbers(Args::command())
+}
+
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    let is_value = |arg: &Arg| arg.get_long().is_some() && arg.get_action().takes_values();
+    let allowing = |arg: Arg| if is_value(&arg) { arg.allow_negative_numbers(true) } else { arg };
+    command.mut_args(allowing).mut_subcommands(with_negative_numbers)
 }
 
 /// Command to run.
@@ -210,7 +233,7 @@ pub struct EvalArgs {
     #[command(flatten)]
     pub source: PolicySource,
     /// Number of episodes.
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = count::<u64>(1..=10_000_000))]
     pub episodes: u64,
     /// Seed of the environments.
     #[arg(long, value_name = "S", default_value_t = marathon_learn::EvalOptions::default().seed)]
@@ -326,7 +349,7 @@ pub struct RecordDemoArgs {
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Number of episodes to record.
-    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = count::<u64>(1..=100_000))]
     pub episodes: u64,
     /// Seed of the environments.
     #[arg(long, value_name = "S", default_value_t = marathon_learn::EvalOptions::default().seed)]
@@ -351,7 +374,7 @@ pub struct SkinArgs {
     #[arg(long, value_name = "F.glb")]
     pub out: PathBuf,
     /// Largest number of triangles, 500 to 20000.
-    #[arg(long, value_name = "N", default_value_t = marathon_skin::Options::default().triangles)]
+    #[arg(long, value_name = "N", default_value_t = marathon_skin::Options::default().triangles, value_parser = count::<usize>(0..=u64::MAX))]
     pub triangles: usize,
 }
 
@@ -367,10 +390,9 @@ pub struct PlayArgs {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn the_command_line_is_consistent() {
-        Args::command().debug_assert();
+        command().debug_assert();
     }
 }

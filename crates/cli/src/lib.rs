@@ -15,7 +15,7 @@ mod program;
 mod video;
 
 use args::{Args, Command};
-use clap::Parser;
+use clap::FromArgMatches;
 use clap::error::{ContextKind, ContextValue};
 use error::CliError;
 use marathon_physics::budget;
@@ -33,7 +33,7 @@ const STUDIES: &str = "the studies are in marathon-studies: `cargo run --release
 pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
     let words: Vec<OsString> = words.into_iter().collect();
     program::set_name(words.first());
-    let code = match Args::try_parse_from(&words) {
+    let code = match parse(&words) {
         Ok(args) => match dispatch(&args) {
             Ok(()) => 0,
             Err(error) => {
@@ -48,10 +48,23 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
     terminal::finish(code)
 }
 
-/// Adds the new place of the studies to the error of `marathon study`.
+/// Reads the words of a command line.
+fn parse(words: &[OsString]) -> Result<Args, clap::Error> {
+    let mut command = args::command();
+    let found = command.try_get_matches_from_mut(words)?;
+    Args::from_arg_matches(&found).map_err(|error| error.format(&mut command))
+}
+
+/// Adds the new place of the studies to the error of `marathon study`, and leaves hidden commands out of lists.
 fn with_advice(mut answer: clap::Error) -> clap::Error {
     if answer.get(ContextKind::InvalidSubcommand) == Some(&ContextValue::String("study".into())) {
         answer.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![STUDIES.into()]));
+    }
+    if let Some(ContextValue::Strings(names)) = answer.get(ContextKind::ValidSubcommand) {
+        let command = args::command();
+        let hidden = |name: &str| command.find_subcommand(name).is_some_and(clap::Command::is_hide_set);
+        let shown = names.iter().filter(|name| !hidden(name)).cloned().collect();
+        answer.insert(ContextKind::ValidSubcommand, ContextValue::Strings(shown));
     }
     answer
 }
@@ -60,6 +73,8 @@ fn dispatch(args: &Args) -> Result<(), CliError> {
     if let Some(obstacle) = Isa::best().obstacle() {
         return Err(CliError::Processor(obstacle));
     }
+    // any limit reads the whole variable
+    budget::MEMORY.most().map_err(|error| CliError::Usage(error.to_string()))?;
     match &args.command {
         Command::Train(train) => commands::train::run(train, args.json),
         Command::Distill(distill) => commands::distill::run(distill, args.json),
@@ -73,16 +88,11 @@ fn dispatch(args: &Args) -> Result<(), CliError> {
         Command::Serve(serve) => commands::serve::run(serve, args.json),
         Command::List { agent } => commands::list::run(agent.as_deref(), args.json),
         Command::Bench(bench) => bench::run(bench, args.json),
-    // any limit reads the whole variable
-    budget::MEMORY.most().map_err(|error| CliError::Usage(error.to_string()))?;
         Command::Config(command) => commands::config::run(command, args.json),
         Command::RolloutWorker => commands::rollout_worker::run(),
         Command::Motion(what) => motion::run(what, args.json),
         Command::Skin(skin) => commands::skin::run(skin, args.json),
         Command::Doctor => commands::doctor::run(args.json),
-        Command::Completions { shell } => {
-            commands::completions::run(*shell);
-            Ok(())
-        }
+        Command::Completions { shell } => commands::completions::run(*shell),
     }
 }

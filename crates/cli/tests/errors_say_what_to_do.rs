@@ -23,6 +23,17 @@ fn unknown_names_come_with_the_nearest() {
     says(&fail(temp.path(), 2, &["train", "hopper", "--sede", "3"]), &["--sede", "--seed"]);
     says(&fail(temp.path(), 2, &["train"]), &["<AGENT>"]);
     says(&fail(temp.path(), 2, &["train", "hopper", "--steps", "lots"]), &["lots", "4M"]);
+    says(&fail(temp.path(), 2, &["train", "hopper", "--steps", "1.5"]), &["1.5", "whole number of steps"]);
+    let text = fail(temp.path(), 2, &["train", "hopper", "--steps", "-5"]);
+    says(&text, &["'-5'", "--steps", "4M"]);
+    assert!(!text.contains("tip:"), "{text}");
+    says(&fail(temp.path(), 2, &["eval", "a", "--episodes", "1e8"]), &["1e8", "1 to 10000000"]);
+    says(
+        &fail(temp.path(), 2, &["skin", "ant", "--triangles", "1e9", "--out", "a.glb"]),
+        &["--triangles is 1000000000"],
+    );
+    let text = fail(temp.path(), 1, &["train", "hopper", "--option", "foo=1"]);
+    says(&text, &["takes no option 'foo'; it has no options"]);
 }
 
 #[test]
@@ -34,6 +45,22 @@ fn a_broken_configuration_names_key_and_line() {
     says(&text, &["bad.yaml:5: ppo.lr_rang: unknown key; did you mean 'lr_range'?"]);
     says(&fail(temp.path(), 1, &["train", "hopper", "--config", "none.yaml"]), &["none.yaml"]);
     says(&fail(temp.path(), 1, &["train", "hopper", "--agents", "100"]), &["agents is 100", "multiple of 16", "96"]);
+    assert!(!temp.path().join("runs").exists(), "an error leaves no folder");
+
+    // a task of the file that does not exist, options and roles: also where settings are only shown
+    std::fs::write(temp.path().join("tasks.yaml"), "tasks:\n  Hoper: {run: {seed: 1}}\n").unwrap();
+    for command in [&["train"][..], &["config", "show"]] {
+        let with = |words: &[&str]| fail(temp.path(), 1, &[command, &["ant"], words].concat());
+        let text = with(&["--config", "tasks.yaml"]);
+        says(&text, &["tasks.yaml:2: tasks.Hoper: found 'Hoper'", "did you mean 'Hopper-v0'?"]);
+        says(&with(&["--set", "options.fall_penalt=3"]), &["takes no option 'fall_penalt'"]);
+        says(&with(&["--set", "roles.bulder.ppo.lr=3"]), &["roles is bulder, expected none"]);
+    }
+    let imitation = fail(temp.path(), 1, &["train", "ant", "--set", "rewards.gail={}"]);
+    assert!(!imitation.contains("results in"), "{imitation}");
+    says(&imitation, &["rewards.gail.demonstrations is null, expected a .demo file: Ant-v0 has no motion clips"]);
+    let roles = ["train", "TerrainHopper", "--option", "course=adversary", "--set", "roles.bulder.ppo.lr=3"];
+    says(&fail(temp.path(), 1, &roles), &["roles is bulder, expected runner, builder; did you mean 'builder'?"]);
     assert!(!temp.path().join("runs").exists(), "an error leaves no folder");
 }
 
@@ -116,6 +143,12 @@ fn a_place_that_cannot_be_written_is_found_before_training() {
     std::fs::write(temp.path().join("file"), "").unwrap();
     let train = |out: &'static str| [&SMALL[..], &["1", "--steps", "100G", "--out", out]].concat();
     says(&fail(temp.path(), 1, &train("file/a")), &["file/a", "create folder"]);
+    says(&fail(temp.path(), 2, &train("file")), &["--out is file: found a file, expected a folder"]);
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("nowhere", temp.path().join("link")).unwrap();
+        says(&fail(temp.path(), 2, &train("link")), &["--out is link: found a link to nothing, expected a folder"]);
+    }
     std::fs::write(temp.path().join("runs"), "").unwrap();
     says(&fail(temp.path(), 1, &["train", "hopper"]), &["runs", "create folder"]);
 }
@@ -128,10 +161,21 @@ fn policies_must_fit_their_agent() {
     says(&fail(temp.path(), 1, &["eval", "a", "--agent", "ant"]), &["policy.safetensors", wrong]);
     says(&fail(temp.path(), 1, &["render", "a", "--agent", "ant", "--out", "x.gif"]), &[wrong]);
     says(&fail(temp.path(), 1, &["eval", "aa"]), &["aa: policy", "no such file", "did you mean 'a'?"]);
+    // a folder without a policy is no correction of itself
+    std::fs::create_dir(temp.path().join("half")).unwrap();
+    std::fs::copy(temp.path().join("a/run.json"), temp.path().join("half/run.json")).unwrap();
+    for half in ["half", "./half", "half/"] {
+        let text = fail(temp.path(), 1, &["eval", half]);
+        says(&text, &["policy: found no policy.safetensors"]);
+        assert!(!text.contains("did you mean 'half"), "{text}");
+    }
+    says(&fail(temp.path(), 1, &["serve", "aa"]), &["aa: policy", "did you mean 'a'?"]);
+    let distill = fail(temp.path(), 1, &["distill", "hopper", "--teacher", "aa", "--out", "x.safetensors"]);
+    says(&distill, &["aa: policy", "did you mean 'a'?"]);
     says(&fail(temp.path(), 1, &["eval", "a/polcy.safetensors"]), &["did you mean 'a/policy.safetensors'?"]);
     std::fs::write(temp.path().join("junk"), "junk").unwrap();
     says(&fail(temp.path(), 1, &["eval", "junk"]), &["junk", "a safetensors file"]);
-    says(&fail(temp.path(), 2, &["eval", "a", "--episodes", "0"]), &["--episodes", "1..=10000000"]);
+    says(&fail(temp.path(), 2, &["eval", "a", "--episodes", "0"]), &["--episodes", "1 to 10000000"]);
     assert!(!temp.path().join("x.gif").exists());
 
     // damaged numbers are found before they are used
@@ -149,6 +193,10 @@ fn pictures_need_a_name_that_says_what_they_are() {
     succeed(temp.path(), &[&SMALL[..], &["1", "--steps", "8k", "--out", "a"]].concat());
     says(&fail(temp.path(), 1, &["render", "a", "--out", "x.gfi"]), &["x.gfi", "did you mean 'gif'?"]);
     says(&fail(temp.path(), 2, &["render", "a", "--out", "x.gif", "--frames", "3"]), &["--frames is for .png"]);
+    says(
+        &fail(temp.path(), 2, &["render", "a", "--out", "x.png", "--width", "0"]),
+        &["--width is 0, expected 1 to 16384"],
+    );
     says(&fail(temp.path(), 2, &["render", "a", "--out", "x.gif", "--seconds", "-1"]), &["--seconds"]);
     says(&fail(temp.path(), 2, &["render", "a", "--out", "none/x.gif"]), &["none/x.gif", "there is no folder none"]);
 }
@@ -166,6 +214,7 @@ fn json_carries_errors_too() {
         (&["--json", "trian"], "'train'"),
         (&["train", "hopper", "--json", "--steps", "lots"], "4M"),
         (&["eval", "--json"], "<POLICY>"),
+        (&["--json"], "completions, help]"),
     ] {
         let output = run(temp.path(), words);
         assert_eq!(output.status.code(), Some(2), "{words:?}");
@@ -205,7 +254,10 @@ fn a_training_that_diverges_says_so() {
     }
     assert!(!temp.path().join("a/policy.safetensors").exists());
     config("1.0e39");
-    says(&fail(temp.path(), 1, &["train", "hopper", "--config", "rate.yaml"]), &["lr is 1", "a positive number"]);
+    says(
+        &fail(temp.path(), 1, &["train", "hopper", "--config", "rate.yaml"]),
+        &["rate.yaml:8: ", "learning_rate: found '1.0e39', expected a positive number"],
+    );
 
     config("1.0e3");
     let output = run(temp.path(), &["train", "hopper", "--config", "rate.yaml", "--out", "b"]);

@@ -27,6 +27,7 @@ fn a_full_disk_behind_stdout_is_an_error() {
         "eval a --episodes 2 --json",
         "export a --json",
         "train hoper --json",
+        "completions bash",
     ] {
         let output = shell(temp.path(), &format!("\"$0\" {words} > /dev/full"));
         let text = stderr(&output);

@@ -30,7 +30,7 @@ pub enum RenderError {
         value: f64,
     },
     /// A width or height that no output format here can hold.
-    #[error("image size {width}x{height} is out of range: each side must be 1..={max}")]
+    #[error("image size {width}x{height} is out of range: each side must be 1 to {max}")]
     Size {
         /// Requested width, pixels.
         width: usize,
@@ -66,7 +66,7 @@ pub enum RenderError {
         nearest: &'static str,
     },
     /// A frame rate that the format does not support.
-    #[error("{}: {fps} frames per second is out of range, expected {min}..={max}", path.display())]
+    #[error("{}: {fps} frames per second is out of range, expected {min} to {max}", path.display())]
     Fps {
         /// File to be written.
         path: PathBuf,

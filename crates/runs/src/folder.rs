@@ -43,6 +43,7 @@ impl RunFolder {
     pub fn create(out: Option<&Path>, agent: &str) -> Result<Self, RunError> {
         let (path, made) = match out {
             Some(out) => {
+                refuse_file(out)?;
                 refuse(out)?;
                 let missing = out.ancestors().take_while(|p| !p.as_os_str().is_empty() && !p.exists());
                 let made = missing.map(Path::to_path_buf).collect();
@@ -275,6 +276,16 @@ impl RunFolder {
     }
 }
 
+/// Refuses a name that something other than a folder has.
+fn refuse_file(out: &Path) -> Result<(), RunError> {
+    let Ok(facts) = fs::symlink_metadata(out) else { return Ok(()) };
+    if out.is_dir() {
+        return Ok(());
+    }
+    let found = if facts.is_symlink() && !out.exists() { "a link to nothing" } else { "a file" };
+    Err(RunError::option("out", format!("is {}: found {found}, expected a folder", text::path_word(out))))
+}
+
 /// Refuses a folder that holds anything other than a run without an iteration.
 fn refuse(out: &Path) -> Result<(), RunError> {
     if is_blank(out) {
@@ -414,7 +425,7 @@ pub fn policy_path(given: &Path) -> Result<PathBuf, RunError> {
     let found = if given.is_dir() { "no policy.safetensors" } else { "no such file" };
     let fits = |entry: &Path| {
         let is_policy = entry.extension().is_some_and(|end| end == "safetensors" || end == "onnx");
-        is_policy || entry.join(RUN).is_file()
+        is_policy || entry.join("policy.safetensors").is_file()
     };
     let near = did_you_mean(text::nearest_path(given, &[Path::new(RUNS)], fits));
     let expected = format!("a policy file or the folder of a run{near}");

@@ -2,7 +2,7 @@
 
 use serde::Serializer;
 use std::borrow::Cow;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// `12345678` as `12,345,678`.
 pub fn thousands(n: u64) -> String {
@@ -32,6 +32,11 @@ pub fn short(x: f64) -> String {
         x if x >= 9.995e2 => format!("{:.1} k", x / 1e3),
         x => format!("{x:.0}"),
     }
+}
+
+/// A number of things: `1 agent`, `12,288 agents`.
+pub fn counted(n: usize, noun: &str) -> String {
+    format!("{} {noun}{}", thousands(n as u64), if n == 1 { "" } else { "s" })
 }
 
 /// Seconds as `8.3 s`, `2 min 05 s` or `1 h 02 min`.
@@ -126,6 +131,14 @@ pub fn word(text: &str) -> String {
     if !text.is_empty() && text.chars().all(plain) { text.into() } else { format!("'{}'", text.replace('\'', r"'\''")) }
 }
 
+/// Whether two paths have the same names, apart from `.`.
+fn is_same(a: &Path, b: &Path) -> bool {
+    fn names(path: &Path) -> impl Iterator<Item = Component<'_>> {
+        path.components().filter(|part| *part != Component::CurDir)
+    }
+    names(a).eq(names(b))
+}
+
 /// A path with a similar name to `path`, next to it or in one of these folders, that satisfies `fits`.
 pub fn nearest_path(path: &Path, folders: &[&Path], fits: impl Fn(&Path) -> bool) -> Option<String> {
     let asked = path.display().to_string();
@@ -134,7 +147,8 @@ pub fn nearest_path(path: &Path, folders: &[&Path], fits: impl Fn(&Path) -> bool
     for folder in [parent].iter().chain(folders) {
         for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
             let other = entry.path();
-            if fits(&other) {
+            // the path itself is no correction of it
+            if !is_same(&other, path) && fits(&other) {
                 let name = other.display().to_string();
                 let name = name.strip_prefix("./").unwrap_or(&name).to_string();
                 near.push((strsim::damerau_levenshtein(&asked, &name), name));

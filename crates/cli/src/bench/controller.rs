@@ -1,6 +1,7 @@
 //! `bench controller`: how well policies track commands.
 
 use super::options::Head;
+use crate::args::count;
 use crate::error::CliError;
 use marathon_learn::EvalOptions;
 use marathon_runs::terminal::{print_json, say};
@@ -14,7 +15,7 @@ pub struct ControllerArgs {
     #[command(flatten)]
     pub source: PolicySource,
     /// Agents of each trial.
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = count::<u64>(1..=100_000))]
     pub episodes: u64,
     /// Seed of the environments.
     #[arg(long, value_name = "S", default_value_t = EvalOptions::default().seed)]

@@ -2,6 +2,7 @@
 //! regular steps, and their time does not count.
 
 use super::options::{Common, Head, for_networks};
+use crate::args::count;
 use crate::error::CliError;
 use marathon_config as config;
 use marathon_envs::registry;
@@ -28,19 +29,19 @@ pub struct GaitArgs {
     #[arg(long, value_name = "F.yaml")]
     pub config: Option<PathBuf>,
     /// Number of seeds.
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = count::<u64>(1..=1000))]
     pub seeds: u64,
     /// The first seed; the others follow it.
-    #[arg(long, value_name = "S", default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=u64::MAX - 1000))]
+    #[arg(long, value_name = "S", default_value_t = 1, value_parser = count::<u64>(0..=u64::MAX - 1000))]
     pub first_seed: u64,
     /// Demanded mean speed, m/s.
     #[arg(long, value_name = "M/S", default_value_t = 2.0, value_parser = speed)]
     pub speed: f64,
     /// Largest number of falls in 100 episodes.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=EPISODES as u64))]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = count::<u64>(0..=EPISODES as u64))]
     pub falls: u64,
     /// Steps between two evaluations, whose time does not count.
-    #[arg(long, value_name = "N", default_value_t = 250_000, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 250_000, value_parser = count::<u64>(1..=u64::MAX))]
     pub every: u64,
 }
 

@@ -1,5 +1,6 @@
 //! Options of all benchmarks, and properties of the computer.
 
+use crate::args::count;
 use crate::error::CliError;
 use marathon_envs::registry;
 use marathon_physics::lanes::Isa;
@@ -12,7 +13,7 @@ pub struct Common {
     #[arg(long, value_name = "AGENT")]
     pub agent: Vec<String>,
     /// Threads; 0 means one per processor.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(0..=4096))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = count::<u64>(0..=4096))]
     pub threads: u64,
 }
 

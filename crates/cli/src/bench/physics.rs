@@ -5,6 +5,7 @@ use super::options::{Common, Head, isas, seconds, supported};
 use super::plan::{Counts, Plan, Which};
 use super::row::{Figures, Row, Table};
 use super::workload::{Subject, controls, repeat};
+use crate::args::count;
 use crate::error::CliError;
 use clap::ValueEnum;
 use marathon_physics::SimError;
@@ -37,10 +38,10 @@ pub struct PhysicsArgs {
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds)]
     pub seconds: f64,
     /// Agents of each thread, rounded up to whole groups of lanes.
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u64).range(1..=65536))]
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = count::<u64>(1..=65536))]
     pub agents: u64,
     /// Untimed steps at the start of a repetition, rounded up to a multiple of four, the steps that a control is held.
-    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u64).range(0..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = count::<u64>(0..=1_000_000))]
     pub warmup: u64,
     /// Turn the actuators off, so that bodies only fall and pile up.
     #[arg(long)]

@@ -2,6 +2,7 @@
 
 use super::options::{Common, Head, for_networks, seconds};
 use super::row::{Figures, Row, Table};
+use crate::args::count;
 use crate::error::CliError;
 use crate::program;
 use marathon_config as config;
@@ -32,7 +33,7 @@ pub struct TrainArgs {
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = seconds)]
     pub seconds: f64,
     /// Width of both hidden layers [default: the configuration's].
-    #[arg(long, value_name = "WIDTH", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    #[arg(long, value_name = "WIDTH", value_parser = count::<u32>(1..=4096))]
     pub hidden: Option<u32>,
     /// Number of agents, a multiple of 16 [default: the configuration's].
     #[arg(long, value_name = "N")]

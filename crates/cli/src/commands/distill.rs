@@ -40,13 +40,16 @@ pub fn run(args: &DistillArgs, json: bool) -> Result<(), CliError> {
     args.options.validate()?;
     let notes = notes(&args.out);
     let task = TaskConfig::named(&args.agent)?.with(&args.task)?;
+    task.check_model(&args.agent, &args.task)?;
+    // a missing file is found before the first line
+    args.teachers.iter().try_for_each(|teacher| policy_file::read(teacher, None).map(drop))?;
     let options = &args.options;
     interrupt::install("finishing this round and writing the policy")?;
     let verb = if notes.exists() { "continuing" } else { "learning" };
     note(format!(
-        "{verb} {} from {} teachers: {} decisions, seed {}",
+        "{verb} {} from {}: {} decisions, seed {}",
         task.agent,
-        args.teachers.len(),
+        text::counted(args.teachers.len(), "teacher"),
         text::thousands(options.steps),
         options.seed
     ));

@@ -79,7 +79,7 @@ pub fn run(agent: Option<&str>, json: bool) -> Result<(), CliError> {
 /// Collects the information about an agent, by any of its names.
 fn entry(name: &str) -> Result<Entry, CliError> {
     let agent = registry::agent(name)?;
-    let factory = agent.clone().shards(Isa::F32)?;
+    let factory = agent.clone().shards(Isa::best())?;
     let spec = factory.spec();
     let range = |(low, high): (&f32, &f32)| [finite(*low), finite(*high)];
     let part = |group: &ObsGroup| Part { name: group.name.clone(), range: [group.range.start, group.range.end] };
@@ -133,8 +133,12 @@ fn tell(e: &Entry) {
         let end = |x: &Option<f32>| x.map_or("any".to_string(), |x| x.to_string());
         say(format!("  {:>9}  {name}", format!("{}..{}", end(low), end(high))));
     }
-    for Order { name, range: [low, high], unit } in &e.command {
-        say(format!("command\n  {:>9}  {name} {unit}", format!("{low}..{high}")));
+    if !e.command.is_empty() {
+        say("command");
+    }
+    for Order { name, range, unit } in &e.command {
+        let [low, high] = range.map(short);
+        say(format!("  {:>9}  {name} {unit}", format!("{low}..{high}")).trim_end());
     }
     for (what, names) in [("reward", &e.reward_terms), ("info", &e.info), ("metrics", &e.metrics)] {
         if !names.is_empty() {
@@ -156,6 +160,12 @@ fn tell(e: &Entry) {
 fn argument(info: OptionInfo) -> Argument {
     let OptionInfo { name, value, expected, about, .. } = info;
     Argument { name, default: value.to_string(), expected, about }
+}
+
+/// A number with at most three decimals.
+fn short(x: f64) -> f64 {
+    // no negative zero
+    (1e3 * x).round() / 1e3 + 0.0
 }
 
 /// JSON has no infinities.

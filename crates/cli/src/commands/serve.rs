@@ -32,10 +32,10 @@ pub fn run(args: &ServeArgs, json: bool) -> Result<(), CliError> {
     if !(1..=MAX_AGENTS).contains(&args.agents) {
         return Err(CliError::Usage(format!("--agents is {}, expected 1 to {MAX_AGENTS}", args.agents)));
     }
-    let page = find_page(args.page.as_deref())?;
     let mut folder = Folder::new(&args.source);
     // errors of the policy come before the address
     let mut first = if folder.waits() { None } else { Some(folder.load()?) };
+    let page = find_page(args.page.as_deref())?;
     let viewer = Viewer::start(&page, args.port)?;
     interrupt::install("leaving")?;
     if json {

@@ -20,7 +20,7 @@ use std::io::IsTerminal;
 pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
     let task = args.agent.as_deref().map(Task::named).transpose()?;
     let (session, notes) = Session::open(task, &args.run, None, false)?;
-    notes.iter().for_each(|note| terminal::note(format!("note: {note}")));
+    terminal::notes(notes);
     let spec = session.factory.spec().clone();
     let (total_steps, agent) = (session.run.config.run.total_steps, session.run.agent.clone());
     interrupt::install("finishing this iteration and writing the results")?;
@@ -91,12 +91,11 @@ fn announce(session: &Session) {
         findings.lines().for_each(terminal::note);
     }
     terminal::note(format!(
-        "{verb} {}{from} to {}: {} agents, {} thread{}, {}, seed {}; results in {}",
+        "{verb} {}{from} to {}: {}, {}, {}, seed {}; results in {}",
         run.agent,
         text::thousands(config.run.total_steps),
-        config.run.agents,
-        config.run.worker_count(),
-        if config.run.worker_count() == 1 { "" } else { "s" },
+        text::counted(config.run.agents, "agent"),
+        text::counted(config.run.worker_count(), "thread"),
         Isa::best().name(),
         config.run.seed,
         folder

@@ -5,6 +5,7 @@ pub mod model;
 mod policy;
 mod show;
 
+use crate::args::count;
 use crate::error::CliError;
 use crate::video::Ghost;
 use clap::{Subcommand, ValueEnum};
@@ -171,7 +172,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "S")]
     pub seconds: Option<f64>,
     /// Frames of a .png strip.
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = count::<u64>(1..=1000))]
     pub frames: u64,
     /// Frames per second of a video.
     #[arg(long, value_name = "HZ", default_value_t = 25.0)]
