@@ -2,12 +2,12 @@
 
 use crate::bench::BenchArgs;
 use crate::motion::MotionArgs;
+use crate::number::count;
 use crate::video::Ghost;
 use clap::{Arg, CommandFactory, Parser, Subcommand};
 use marathon_learn::Algorithm;
 use marathon_runs::distill::DistillOptions;
 use marathon_runs::{PolicySource, RunOptions, TaskOptions, VideoOptions};
-use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -37,17 +37,6 @@ pub struct Args {
     /// Command to run.
     #[command(subcommand)]
     pub command: Command,
-}
-
-/// Parser of a whole number in a range, with the short forms of `--steps`.
-pub fn count<N: TryFrom<u64>>(range: RangeInclusive<u64>) -> impl Fn(&str) -> Result<N, String> + Clone {
-    move |text| {
-        let number = marathon_config::steps(text).filter(|number| range.contains(number));
-        number.and_then(|number| number.try_into().ok()).ok_or_else(|| match (range.start(), range.end()) {
-            (0, &u64::MAX) => "expected a whole number such as 1000 or 1e3".into(),
-            (least, most) => format!("expected a whole number from {least} to {most}"),
-        })
-    }
 }
 
 /// The command line as clap knows it. An option takes a negative number as its value and refuses it by name.

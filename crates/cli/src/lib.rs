@@ -11,6 +11,7 @@ mod bench;
 mod commands;
 mod error;
 mod motion;
+mod number;
 mod program;
 mod video;
 

@@ -39,7 +39,7 @@ pub enum EnvError {
     NotAModel {
         /// The name.
         path: String,
-        /// What the path is.
+        /// A description of the path.
         found: &'static str,
         /// A way to make a model of it.
         hint: &'static str,

@@ -1,8 +1,8 @@
 //! `bench controller`: how well policies track commands.
 
 use super::options::Head;
-use crate::args::count;
 use crate::error::CliError;
+use crate::number::count;
 use marathon_learn::EvalOptions;
 use marathon_runs::terminal::{print_json, say};
 use marathon_runs::{CommandTracking, PolicySource, controller, output};

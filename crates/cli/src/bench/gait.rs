@@ -2,8 +2,8 @@
 //! regular steps, and their time does not count.
 
 use super::options::{Common, Head, for_networks};
-use crate::args::count;
 use crate::error::CliError;
+use crate::number::count;
 use marathon_config as config;
 use marathon_envs::registry;
 use marathon_learn::{Control, EvalOptions, Evaluation, IterationStats, Snapshot, evaluate, train};

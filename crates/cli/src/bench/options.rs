@@ -1,7 +1,7 @@
 //! Options of all benchmarks, and properties of the computer.
 
-use crate::args::count;
 use crate::error::CliError;
+use crate::number::count;
 use marathon_envs::registry;
 use marathon_physics::lanes::Isa;
 use serde::Serialize;

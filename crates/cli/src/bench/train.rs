@@ -2,8 +2,8 @@
 
 use super::options::{Common, Head, for_networks, seconds};
 use super::row::{Figures, Row, Table};
-use crate::args::count;
 use crate::error::CliError;
+use crate::number::count;
 use crate::program;
 use marathon_config as config;
 use marathon_learn::{Control, IterationStats, Players, Snapshot, train_with};

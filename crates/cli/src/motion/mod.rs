@@ -5,8 +5,8 @@ pub mod model;
 mod policy;
 mod show;
 
-use crate::args::count;
 use crate::error::CliError;
+use crate::number::count;
 use crate::video::Ghost;
 use clap::{Subcommand, ValueEnum};
 use marathon_motion::import::Up;
