@@ -41,8 +41,8 @@ fn a_folder_of_something_else_is_refused_and_stays_whole() {
     // what is not a folder
     let temp = tempfile::tempdir().unwrap();
     std::fs::write(temp.path().join("a"), "precious").unwrap();
-    let text = fail(temp.path(), 1, &train("a"));
-    assert!(text.contains("a: create folder"), "{text}");
+    let text = fail(temp.path(), 2, &train("a"));
+    assert!(text.contains("--out is a: found a file, expected a folder"), "{text}");
     assert_eq!(std::fs::read(temp.path().join("a")).unwrap(), b"precious");
 }
 
