@@ -172,10 +172,11 @@ fn a_saved_animation_continues() -> Done {
     let play = clip(&mut app, "marathon_man/walk.motion")?;
     app.world_mut().entity_mut(walker).insert(play);
     run(&mut app, 0.7);
-    let saved = app.world_mut().resource_mut::<Marathon>().save_all();
+    let key = *app.world().get::<RagdollState>(walker).ok_or("it has entered")?;
+    let saved = app.world_mut().resource_mut::<Marathon>().save(&key).ok_or("a snapshot")?;
     run(&mut app, 1.0);
     let first = state(&app, walker);
-    app.world_mut().resource_mut::<Marathon>().restore_all(&saved)?;
+    app.world_mut().resource_mut::<Marathon>().restore(&key, &saved)?;
     run(&mut app, 1.0);
     assert_eq!(state(&app, walker), first);
     Ok(())

@@ -188,10 +188,8 @@ fn a_pile_of_boxes_is_run_into() -> Result<(), Box<dyn Error>> {
     let pile = piles.single(app.world())?;
     assert_ne!(pile, first);
     let start = boxes(&mut app, pile);
-    let way = *app.world_mut().query_filtered::<&Transform, With<Pile>>().single(app.world())?;
-    let mut runner = app.world_mut().query_filtered::<Entity, With<Actor>>();
-    let runner = runner.single(app.world())?;
-    app.world_mut().entity_mut(runner).insert(MoveDirection::new(0.6 * *way.right()));
+    // the key of the direction away from the camera
+    app.world_mut().resource_mut::<ButtonInput<KeyCode>>().press(KeyCode::KeyW);
     frames(&mut app, 300);
     let now = boxes(&mut app, pile);
     let moved = start.iter().zip(&now).filter(|(a, b)| a.distance(**b) > 0.2).count();
