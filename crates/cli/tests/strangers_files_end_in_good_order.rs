@@ -173,9 +173,9 @@ fn pictures_beyond_measure_are_refused() {
     let temp = tempfile::tempdir().unwrap();
     let hopper = shipped("hopper");
     for (words, part) in [
-        (&["--out", "x.png", "--width", "60000", "--height", "60000"][..], "asks for"),
+        (&["--out", "x.png", "--width", "60000", "--height", "60000"][..], "--width is 60000, expected 1 to 16384"),
         (&["--out", "x.png", "--frames", "1000", "--width", "3000", "--height", "3000"], "asks for"),
-        (&["--out", "x.gif", "--width", "18446744073709551615"], "asks for"),
+        (&["--out", "x.gif", "--width", "18446744073709551615"], "--width is 18446744073709551615"),
         (&["--out", "x.gif", "--seconds", "1e300"], "--seconds asks for"),
         (&["--out", "x.gif", "--start", "1e9"], "--start asks for"),
         (&["--out", "x.gif", "--seconds", "nan"], "--seconds is NaN"),
