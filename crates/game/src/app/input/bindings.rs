@@ -74,7 +74,7 @@ const DEFAULTS: [Row; 43] = [
     act(Action::Throw, "throw a ball", KeyCode::KeyB, Some(GamepadButton::RightTrigger2)),
     act(Action::Boxes, "boxes", KeyCode::KeyO, None),
     act(Action::Limp, "limp", KeyCode::KeyZ, None),
-    act(Action::Film, "film of the last 10 s", KeyCode::F9, None),
+    act(Action::Film, "keep a film", KeyCode::F9, None),
     act(Action::Contacts, "contacts", KeyCode::KeyF, None),
     act(Action::Joints, "joints", KeyCode::KeyJ, None),
     act(Action::Ghost, "ghost of the clip", KeyCode::KeyK, None),
