@@ -3,6 +3,7 @@
 use crate::error::RunError;
 use crate::task_config::{TaskConfig, TaskOptions};
 use marathon_config::{Loaded, default_for, default_of, parse, set};
+use marathon_envs::options::Value;
 use marathon_envs::registry;
 use marathon_physics::budget;
 use marathon_physics::hint::{did_you_mean, nearest};
@@ -40,14 +41,29 @@ pub fn of(task: &str, file: Option<&Path>, algorithm: Option<&str>, settings: &[
     with(loaded, settings)
 }
 
-/// Refuses options and roles that a task does not have, as a run does.
+/// Value of the options that add roles to a task.
+const ADVERSARY: &str = "adversary";
+
+/// Refuses options and roles that a task does not have. Unlike a run, it allows roles that the task has only with an option of the
+/// command line.
 ///
 /// # Errors
 /// Names the option or role and the nearest.
 pub fn check(loaded: &Loaded, task: TaskConfig) -> Result<(), RunError> {
     let task = task.with(&TaskOptions { given: loaded.options.clone() })?;
-    let roles = registry::global().agent_with(&task.agent, &task.options)?.facts().roles;
-    Ok(loaded.config.check_role_names(&roles.iter().map(|role| role.name.as_str()).collect::<Vec<_>>())?)
+    let agent = registry::global().agent_with(&task.agent, &task.options)?;
+    let mut names: Vec<String> = agent.facts().roles.into_iter().map(|role| role.name).collect();
+    for info in agent.options() {
+        let value = Value::from(ADVERSARY);
+        if info.takes(&value) {
+            let mut options = task.options.clone();
+            options.set(info.name, value);
+            let with = registry::global().agent_with(&task.agent, &options)?;
+            names.extend(with.facts().roles.into_iter().map(|role| role.name));
+        }
+    }
+    names.dedup();
+    Ok(loaded.config.check_role_names(&names.iter().map(String::as_str).collect::<Vec<_>>())?)
 }
 
 /// A configuration with settings `KEY=VALUE` over it.
