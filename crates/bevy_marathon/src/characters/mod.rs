@@ -3,6 +3,7 @@
 //! Each ragdoll has a lane in a batch of its kind. Neither the lane nor the other ragdolls of the batch change its bits. Each
 //! kind has a clock, ahead of the game's by at most one decision, so that a frame always lies between two states.
 
+mod animated;
 mod batch;
 mod detector;
 mod event;

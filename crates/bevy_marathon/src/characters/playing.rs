@@ -3,10 +3,8 @@
 //! The difference between the ragdoll and the clip at the start fades like a critically damped spring, in place and velocity
 //! ("inertialization": D. Bollo, GDC 2018; D. Holden, "Spring-It-On", 2021).
 
-use super::CharacterBatch;
-use super::batch::Engine;
 use crate::pose::heading;
-use marathon_envs::{AgentState, BLOCK};
+use marathon_envs::AgentState;
 use marathon_motion::{Clip, Cycle};
 use marathon_physics::Model;
 use marathon_physics::model::JointType;
@@ -70,7 +68,7 @@ impl Playing {
     }
 
     /// Moves the clip to where a ragdoll is, and notes how its pose differs.
-    fn start(&mut self, model: &Model, qpos: &[f64], qvel: &[f64]) {
+    pub fn start(&mut self, model: &Model, qpos: &[f64], qvel: &[f64]) {
         let Some((clip_qpos, _)) = self.clip_state(model) else { return };
         if let Some(free) = root(model) {
             self.yaw = heading(model, qpos) - heading(model, &clip_qpos);
@@ -115,7 +113,7 @@ impl Playing {
     }
 
     /// The state after `seconds` more.
-    fn advance(&mut self, model: &Model, seconds: f64) -> Option<AgentState> {
+    pub fn advance(&mut self, model: &Model, seconds: f64) -> Option<AgentState> {
         self.time += self.speed * seconds;
         self.elapsed += seconds;
         let (mut qpos, mut qvel) = self.clip_state(model)?;
@@ -157,48 +155,6 @@ fn parts(kind: JointType) -> (usize, bool) {
 
 fn quat(q: &[f64], at: usize) -> [f64; 4] {
     [q[at], q[at + 1], q[at + 2], q[at + 3]]
-}
-
-impl CharacterBatch {
-    /// The model of its ragdolls.
-    pub fn model(&self) -> &Model {
-        &self.model
-    }
-
-    /// Starts a clip on a ragdoll.
-    pub fn play(&mut self, lane: usize, mut playing: Playing) {
-        let Some(slot) = &mut self.lanes[lane] else { return };
-        if let Some(now) = slot.history.back() {
-            playing.start(&self.model, &now.qpos, &now.qvel);
-            slot.playing = Some(playing);
-        }
-    }
-
-    /// Gives a ragdoll back to the physics.
-    pub fn stop(&mut self, lane: usize) {
-        let Some(slot) = &mut self.lanes[lane] else { return };
-        (slot.playing, slot.revived) = (None, true);
-        if let Engine::Env(env) = self.engine.get() {
-            let mask: [bool; BLOCK] = std::array::from_fn(|i| i == lane);
-            let _ = env.observe(&mask, &mut self.obs);
-        }
-    }
-
-    /// Puts a ragdoll where its clip has it after a decision. Returns whether a clip moves it.
-    pub(super) fn animate(&mut self, lane: usize) -> bool {
-        let dt = self.dt;
-        let Some(slot) = self.lanes[lane].as_mut().filter(|slot| !slot.is_limp()) else { return false };
-        let Some(state) = slot.playing.as_mut().and_then(|playing| playing.advance(&self.model, dt)) else {
-            return false;
-        };
-        slot.begin_now = false;
-        match self.engine.get() {
-            // the lengths are those of the model
-            Engine::Env(env) => drop(env.set_state(lane, &state)),
-            Engine::Free(batch, _) => batch.reset(lane, &state.qpos, &state.qvel),
-        }
-        true
-    }
 }
 
 #[cfg(test)]
