@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Writes docs/reference/cli.md, docs/reference/python.md and docs/images/speed.svg from their sources.
+"""Writes docs/reference/{cli,python,python-modules}.md and docs/images/speed.svg from their sources.
 
     docs/generate.py --program target/release/marathon            write the pages
     docs/generate.py --program target/release/marathon --check    fail if a page is out of date
 
-The page of the command line comes from `marathon --help`, that of Python from the types and docstrings of the package,
+The page of the command line comes from `marathon --help`, those of Python from the types and docstrings of the package,
 and the chart from the table of the README.
 """
 
@@ -31,9 +31,11 @@ def main() -> None:
     parser.add_argument("--program", required=True, help="the program `marathon`")
     parser.add_argument("--check", action="store_true", help="fail if a page is out of date")
     options = parser.parse_args()
+    package = DOCS.parent / "python/marathon_rl"
     pages = {
         DOCS / "reference/cli.md": cli_page.page(options.program),
-        DOCS / "reference/python.md": python_page.page(DOCS.parent / "python/marathon_rl"),
+        DOCS / "reference/python.md": python_page.page(package),
+        DOCS / "reference/python-modules.md": python_page.modules_page(package),
         DOCS / "images/speed.svg": speed_chart.svg(DOCS.parent / "README.md"),
     }
     if not options.check:

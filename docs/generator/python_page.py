@@ -27,11 +27,21 @@ INTRODUCTION = """\
 
 <!-- Written by docs/generate.py from the sources of the package; do not edit. -->
 
-This page lists the public names of the package `marathon_rl` and of its modules.
+This page lists the public names of the package `marathon_rl`. [Its modules](python-modules.md) connect it to
+other libraries.
 [Train from Python](../tutorials/python.md) is an introduction. `help(marathon_rl.VecEnv)` prints the same text.
 
 `NDArray` and `ArrayLike` are types of `numpy.typing`. `FloatArray` and `BoolArray` are NumPy arrays of numbers and of
 truth values. `Task` is the name of a task, or a subclass of `MarathonAgent`. `N` is the number of agents.
+"""
+
+MODULES_INTRODUCTION = """\
+# Python API: modules
+
+<!-- Written by docs/generate.py from the sources of the package; do not edit. -->
+
+These modules of the package connect [its names](python.md) to other libraries, and compare them with
+Gymnasium. Import each by its full name.
 """
 
 
@@ -77,7 +87,7 @@ def exported(package: Path) -> Mapping[str, Module]:
 
 
 def page(package: Path) -> str:
-    """Text of the page."""
+    """Text of the page of the package itself."""
     names = exported(package)
     grouped = {name for group in GROUPS.values() for name in group}
     groups = {**GROUPS, "Other names": tuple(name for name in names if name not in grouped)}
@@ -91,21 +101,28 @@ def page(package: Path) -> str:
         rows = []
         for name in members:
             text = names[name].section(name)
-            anchor, *_ = [anchors.add(line.lstrip("# ")) for line in text if line.startswith("#")]
-            rows.append((f"[{code(name)}](#{anchor})", summary(_doc(names[name].names[name]))))
+            rows.append((f"[{code(name)}](#{_first_anchor(anchors, text)})", summary(_doc(names[name].names[name]))))
             body += text
         lines += [f"**{title}**", "", *table(["name", "purpose"], rows)]
-    rows = []
+    return "\n".join([*lines, *body]).rstrip() + "\n"
+
+
+def modules_page(package: Path) -> str:
+    """Text of the page of the other public modules."""
+    body, rows, anchors = list[str](), [], Anchors("Python API: modules")
     for name in MODULES:
         module, full = Module(package / f"{name.replace('.', '/')}.py"), f"marathon_rl.{name}"
-        rows.append((f"[{code(full)}](#{anchors.add(full)})", summary(module.doc)))
-        text = [line for member in module.names for line in module.section(member)]
-        for line in text:
-            if line.startswith("#"):
-                anchors.add(line.lstrip("# "))
-        body += [f"## {full}", "", *markdown(module.doc), *text]
-    lines += ["**Modules**", "", *table(["module", "purpose"], rows)]
-    return "\n".join([*lines, *body]).rstrip() + "\n"
+        text = [f"## {full}", "", *markdown(module.doc)]
+        text += [line for member in module.names for line in module.section(member)]
+        rows.append((f"[{code(full)}](#{_first_anchor(anchors, text)})", summary(module.doc)))
+        body += text
+    return "\n".join([MODULES_INTRODUCTION, *table(["module", "purpose"], rows), *body]).rstrip() + "\n"
+
+
+def _first_anchor(anchors: Anchors, text: list[str]) -> str:
+    """Take in the headings of a section and return the anchor of its own."""
+    first, *_ = [anchors.add(line.lstrip("# ")) for line in text if line.startswith("#")]
+    return first
 
 
 def _doc(nodes: list[Definition]) -> str:
