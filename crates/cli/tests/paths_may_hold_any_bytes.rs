@@ -93,7 +93,7 @@ fn printed_commands_can_be_pasted() {
     let output = child.wait_with_output().unwrap();
     let text = stderr(&output);
     assert_eq!(output.status.code(), Some(130), "{text}");
-    let command = text.rsplit_once("go on by `").and_then(|(_, rest)| rest.split_once('`')).expect("a command").0;
+    let command = text.rsplit_once("continue with `").and_then(|(_, rest)| rest.split_once('`')).expect("a command").0;
     let pasted = Command::new("bash").args(["-c", command]).current_dir(temp.path()).output().unwrap();
     assert!(pasted.status.success(), "{command}: {}", stderr(&pasted));
 }

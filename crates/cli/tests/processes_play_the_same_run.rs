@@ -81,7 +81,7 @@ fn a_killed_process_ends_the_run_which_goes_on_with_the_same_bits() {
         learner.stderr.take().unwrap().read_to_string(&mut text).unwrap();
         assert_eq!(status.code(), Some(1), "{out}: {text}");
         assert!(text.contains("of 2, which plays, has ended"), "{text}");
-        assert!(text.contains(&format!("go on by `{} train --resume {out}`", program())), "{text}");
+        assert!(text.contains(&format!("continue with `{} train --resume {out}`", program())), "{text}");
         assert!(!text.contains("panicked"), "{text}");
         assert!(players.iter().all(|id| !alive(*id)), "{out}: a player outlives the learner");
 

@@ -39,7 +39,7 @@ pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
     let players = processes.as_mut().map(|processes| processes as &mut dyn Players);
     let outcome = session.carry_out_with(players, true, &mut { stop })?;
     if let Some(cause) = processes.and_then(|mut processes| processes.error.take()) {
-        let advice = format!("what is done is saved; go on by {}", resume_command(&outcome.summary.folder));
+        let advice = format!("what is done is saved; continue with {}", resume_command(&outcome.summary.folder));
         return Err(CliError::Lost { cause, advice });
     }
     if let Some(line) = text::broken(outcome.summary.diverged) {
@@ -54,7 +54,7 @@ pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
     let path = &outcome.summary.folder;
     let Some(eval) = outcome.evaluation else {
         return Err(CliError::Interrupted(format!(
-            "{} of {} steps are done and saved; go on by {}",
+            "{} of {} steps are done and saved; continue with {}",
             text::thousands(outcome.steps),
             text::thousands(total_steps),
             resume_command(path)
