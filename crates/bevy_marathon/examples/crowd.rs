@@ -43,15 +43,13 @@ fn spawn(mut commands: Commands, assets: Res<AssetServer>) {
 fn walk(
     time: Res<Time>,
     keys: Option<Res<ButtonInput<KeyCode>>>,
-    marathon: Res<Marathon>,
-    mut walkers: Query<(&Ragdoll, &RagdollState, &Transform, &mut MoveDirection)>,
+    mut walkers: Query<(&Ragdoll, &Transform, &mut MoveDirection)>,
 ) {
     let gather = keys.is_some_and(|keys| keys.pressed(KeyCode::Space));
-    for (ragdoll, state, track, mut way) in &mut walkers {
+    for (ragdoll, place, mut way) in &mut walkers {
         let turn = (time.elapsed_secs() / WALK).floor() + ragdoll.number as f32 * 0.618;
         let wander = Vec3::new((turn * 2.4).sin(), 0.0, (turn * 2.4).cos()) * (0.3 + 0.3 * (turn * TAU).sin());
-        let place = marathon.places(state, time.elapsed()).and_then(|places| places.get(1).copied());
-        let home = place.map_or(Vec3::ZERO, |place| -track.transform_point(place.translation).with_y(0.0));
+        let home = -place.translation;
         way.direction = if gather { 0.3 * home } else { wander + 0.02 * home };
     }
 }

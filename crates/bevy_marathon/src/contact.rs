@@ -10,6 +10,7 @@ use crate::marathon::{Marathon, RagdollState};
 use crate::obstacle::{Collides, Obstacle, ObstacleMotion};
 use crate::pose;
 use crate::ragdoll::Anatomy;
+use crate::track::Tracks;
 use bevy::math::Affine3A;
 use bevy::prelude::*;
 use marathon_physics::model::{Geom, GeomType};
@@ -72,7 +73,7 @@ pub(crate) struct Passing(Vec<[Entity; 2]>);
 pub(crate) fn feel(
     mut marathon: ResMut<Marathon>,
     time: Res<Time<Fixed>>,
-    transforms: TransformHelper,
+    (transforms, tracks): (TransformHelper, Tracks),
     mut obstacles: Query<(Entity, &Obstacle, &mut ObstacleMotion)>,
     ragdolls: Query<(Entity, &RagdollState, &Anatomy, &Collides)>,
     mut passing: Local<Passing>,
@@ -86,7 +87,7 @@ pub(crate) fn feel(
     let mut all = Vec::new();
     for (entity, key, anatomy, collides) in ragdolls.iter().filter(|(.., collides)| collides.any()) {
         let awake = marathon.slot(*key).is_some_and(|slot| slot.asleep.is_none());
-        if let (true, Ok(track)) = (awake, transforms.compute_global_transform(entity)) {
+        if let (true, Some(track)) = (awake, tracks.get(entity)) {
             all.push((entity, *key, anatomy, *collides, track.affine()));
         }
     }

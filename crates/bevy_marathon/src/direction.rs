@@ -5,6 +5,7 @@ use crate::command::AgentCommand;
 use crate::marathon::{Marathon, RagdollState};
 use crate::pose::heading;
 use crate::ragdoll::Anatomy;
+use crate::track::Track;
 use bevy::prelude::*;
 use marathon_envs::CommandRange;
 use marathon_motion::wrap_angle;
@@ -149,7 +150,7 @@ impl Aim {
 /// Writes the commands of characters that move in a direction, once per decision.
 pub(crate) fn follow(
     marathon: Res<Marathon>,
-    mut ragdolls: Query<(&mut MoveDirection, &mut AgentCommand, &RagdollState, &Anatomy, &Transform)>,
+    mut ragdolls: Query<(&mut MoveDirection, &mut AgentCommand, &RagdollState, &Anatomy, &Track)>,
 ) {
     for (mut movement, mut command, key, anatomy, track) in &mut ragdolls {
         let ranges = command.shared_ranges();
@@ -168,7 +169,7 @@ pub(crate) fn follow(
             aim.shift = 0.0;
         }
         let course = if direction.length() > 1e-3 {
-            let [x, y, _] = to_physics(track.rotation.inverse() * direction);
+            let [x, y, _] = to_physics(track.place().rotation.inverse() * direction);
             let free = anatomy.model.joints.iter().find(|joint| joint.kind == JointType::Free);
             let first = free.map_or(0, |joint| joint.dof_adr);
             let velocity = [first, first + 1].map(|i| sample.qvel.get(i).copied().unwrap_or(0.0));

@@ -76,6 +76,7 @@ mod report;
 mod simulate;
 mod snapshot;
 mod strength;
+mod track;
 
 pub use animation::PlayClip;
 pub use asset::{MotionClip, PolicyAsset, RagdollPrefab};
@@ -95,6 +96,7 @@ pub use ragdoll::*;
 pub use reactions::HitReactions;
 pub use snapshot::{MarathonSnapshot, RagdollSnapshot};
 pub use strength::LimbStrength;
+pub use track::{Track, Tracks};
 
 /// The names that most apps need.
 pub mod prelude {
@@ -109,7 +111,7 @@ pub mod prelude {
     pub use crate::{
         AgentCommand, CharacterPose, Collides, CommandError, Ground, HitReactions, LimbStrength, Lod, LodByDistance,
         Marathon, MarathonSnapshot, MotionClip, MoveDirection, Obstacle, PlayClip, PolicyAsset, RagdollError,
-        RagdollMode, RagdollPrefab, RagdollSnapshot, RagdollState, SnapshotError, StrengthError,
+        RagdollMode, RagdollPrefab, RagdollSnapshot, RagdollState, SnapshotError, StrengthError, Track, Tracks,
     };
     pub use marathon_physics::Variation;
     pub use marathon_runs::TaskConfig;

@@ -49,7 +49,7 @@ impl Marathon {
         Some(AgentState { qpos: sample.qpos.clone(), qvel: sample.qvel.clone() })
     }
 
-    /// Where the bodies of a ragdoll are at a time, in the order of its model, relative to the ragdoll. Known are the times
+    /// Where the bodies of a ragdoll are at a time, in the order of its model, in the axes of its [`Track`](crate::Track). Known are the times
     /// that a frame of the present tick can show: from `Time<Fixed>::elapsed` on, for a timestep.
     ///
     /// Systems in [`FixedUpdate`] that follow a ragdoll ask here: the transforms of its [`crate::Part`]s are those of the last

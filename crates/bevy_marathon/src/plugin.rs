@@ -23,6 +23,7 @@ use crate::reactions::HitReactions;
 use crate::report;
 use crate::simulate;
 use crate::strength::LimbStrength;
+use crate::track::{self, Track};
 use bevy::prelude::*;
 
 /// Ragdolls for any Bevy app.
@@ -66,6 +67,7 @@ impl Plugin for MarathonPlugin {
                 FixedUpdate,
                 (
                     (
+                        track::take_in,
                         simulate::admit,
                         direction::follow,
                         levels::by_distance,
@@ -82,7 +84,10 @@ impl Plugin for MarathonPlugin {
                     (report::report, simulate::face_targets, animation::end).chain().in_set(MarathonSystems::Report),
                 ),
             )
-            .add_systems(RunFixedMainLoop, (simulate::show, place::show).in_set(MarathonSystems::Show))
+            .add_systems(
+                RunFixedMainLoop,
+                (track::take_in, place::show, simulate::show).chain().in_set(MarathonSystems::Show),
+            )
             .add_observer(simulate::dismiss);
     }
 }
@@ -126,5 +131,6 @@ fn register_types(app: &mut App) {
         .register_type::<OwnGround>()
         .register_type::<Episode>()
         .register_type::<CharacterPose>()
+        .register_type::<Track>()
         .register_type::<Part>();
 }

@@ -1,22 +1,30 @@
 //! Poses: the entities of a ragdoll's parts, and the transforms that a configuration `qpos` gives them.
 
-use crate::axes::{place_to_game, to_game};
+use crate::axes::{place_to_game, to_game, turn_to_game};
 use crate::ragdoll::{Anatomy, Part};
+use crate::track::Track;
 use bevy::prelude::*;
 use marathon_physics::Model;
 use marathon_physics::model::{Geom, GeomType, JointType};
 use marathon_render::{GeomPose, Pose, Scene};
 
-/// Transforms of the bodies of a model in a configuration, in the axes of the ragdoll. `None` if a number is not finite.
+/// Transforms of the bodies of a model in a configuration, in the axes of its [`Track`]. `None` if a number is not finite.
 pub fn places(model: &Model, qpos: &[f64]) -> Option<Vec<Transform>> {
     let pose = Scene::pose_from_qpos(model, qpos).ok()?;
     Some(pose.bodies.iter().map(|body| place_to_game(body.pos, body.quat)).collect())
 }
 
 /// Moves the parts of a ragdoll to the transforms of [`places`], if there are any.
-pub fn put(anatomy: &Anatomy, places: Option<Vec<Transform>>, parts: &mut Query<&mut Transform, With<Part>>) {
+pub fn put(
+    anatomy: &Anatomy,
+    track: &Track,
+    places: Option<Vec<Transform>>,
+    parts: &mut Query<&mut Transform, With<Part>>,
+) {
+    let inverse = track.inverse();
     for (entity, place) in anatomy.parts.iter().zip(places.into_iter().flatten()) {
         if let Ok(mut transform) = parts.get_mut(*entity) {
+            let place = inverse * place;
             (transform.translation, transform.rotation) = (place.translation, place.rotation);
         }
     }
@@ -69,7 +77,7 @@ pub fn velocity([before, after]: &[Pose; 2], point: impl Fn(&Pose) -> [f64; 3]) 
     std::array::from_fn(|i| (b[i] - a[i]) / (2.0 * MOMENT))
 }
 
-/// Place and velocities of the root body, in the axes of the ragdoll.
+/// Place and velocities of the root body, in the axes of the track.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RootMotion {
     /// Transform.
@@ -99,6 +107,12 @@ pub fn root_motion(model: &Model, qpos: &[f64], qvel: &[f64]) -> Option<RootMoti
     let angular = to_game(turn.map(|x| sign * x / MOMENT));
     let place = place_to_game(after.pos, after.quat);
     Some(RootMotion { place, linear, angular })
+}
+
+/// Vertical component of the axis of the root body that is vertical in the model's reference pose: 1 as there, -1 upside down.
+pub fn uprightness(model: &Model, turn: Quat) -> f32 {
+    let rest = model.joints.first().map_or(Quat::IDENTITY, |joint| turn_to_game(model.bodies[joint.body].quat));
+    (turn * (rest.inverse() * Vec3::Y)).y
 }
 
 /// Radius of a ball around the root body that holds a model in any pose, m. `None` unless all its joints belong to one tree with

@@ -15,8 +15,9 @@ use marathon_runs::TaskConfig;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// A physical character. Its [`Transform`] is where its track begins and which way it runs (along its own +x); the
-/// simulated bodies are children, see [`Anatomy`].
+/// A physical character. Its [`Transform`] is where it is and where it faces: below its root body, on the plane of its
+/// [`Track`](crate::Track). It is spawned at the start of the track, and set by the plugin in every frame; set it yourself to move the character.
+/// The simulated bodies are children, see [`Anatomy`].
 ///
 /// Its life depends on the character, `seed`, `number` and what acts on it: not on the frame rate, and not on the other
 /// ragdolls of the world.

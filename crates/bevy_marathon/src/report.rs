@@ -8,6 +8,7 @@ use crate::messages::{
 };
 use crate::mode::RagdollMode;
 use crate::ragdoll::{Anatomy, Episode, OwnGround};
+use crate::track::Tracks;
 use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 use std::sync::Arc;
@@ -71,14 +72,13 @@ impl Writers<'_> {
 pub(crate) fn report(
     mut marathon: ResMut<Marathon>,
     mut ragdolls: Query<(Entity, &RagdollState, &Anatomy, (&mut Episode, &mut OwnGround, &mut RagdollMode))>,
-    transforms: TransformHelper,
+    tracks: Tracks,
     mut writers: Writers,
 ) {
     for (ragdoll, key, anatomy, (mut episode, mut ground, mut mode)) in &mut ragdolls {
         let Some(slot) = marathon.slot_mut(*key) else { continue };
         if !slot.events.is_empty() {
-            // a ragdoll that was spawned in this frame has no global transform yet
-            let track = transforms.compute_global_transform(ragdoll).unwrap_or_default();
+            let track = tracks.get(ragdoll).unwrap_or_default();
             slot.events.drain(..).for_each(|event| writers.write(ragdoll, event, anatomy, &track));
         }
         if *episode != slot.episode {

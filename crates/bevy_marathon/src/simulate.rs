@@ -17,6 +17,7 @@ use crate::ragdoll::{
     Restart, Target, Unfit,
 };
 use crate::strength::LimbStrength;
+use crate::track::{Track, Tracks};
 use bevy::asset::LoadState;
 use bevy::ecs::lifecycle::Remove;
 use bevy::prelude::*;
@@ -37,13 +38,20 @@ pub(crate) fn admit(
     prefabs: Res<Assets<RagdollPrefab>>,
     (policies, server): (Res<Assets<PolicyAsset>>, Res<AssetServer>),
     new: Query<
-        (Entity, &Ragdoll, (&Restart, &Collides), &LimbStrength, Option<&CharacterPolicy>, Option<&AgentCommand>),
+        (
+            Entity,
+            &Ragdoll,
+            (&Restart, &Collides, &Transform),
+            &LimbStrength,
+            Option<&CharacterPolicy>,
+            Option<&AgentCommand>,
+        ),
         (Without<RagdollState>, Without<Unfit>),
     >,
 ) {
     // the tick that begins here shows times from `now` on; its elapsed time is that of its end
     marathon.now = time.elapsed();
-    for (entity, ragdoll, (restart, collides), strength, policy, command) in &new {
+    for (entity, ragdoll, (restart, collides, transform), strength, policy, command) in &new {
         let meta = policy.and_then(|policy| policies.get(&policy.0)).map(|asset| asset.0.meta());
         let loads = |policy: &CharacterPolicy| matches!(server.load_state(&policy.0), LoadState::Loading);
         if ragdoll.task_config.is_none() && meta.is_none() && policy.is_some_and(loads) {
@@ -53,7 +61,7 @@ pub(crate) fn admit(
             Ok(Some(key)) => {
                 let kind = &marathon.kinds[key.kind];
                 let mut entity = commands.entity(entity);
-                entity.insert(strength.with_limbs(&kind.limbs));
+                entity.insert((strength.with_limbs(&kind.limbs), Track::at(*transform)));
                 build(&mut entity, kind, key, command);
             }
             // a prefab that is still being loaded
@@ -242,10 +250,12 @@ pub(crate) fn push(
     mut marathon: ResMut<Marathon>,
     mut pushes: MessageReader<Push>,
     mut restarts: MessageReader<RestartNow>,
-    ragdolls: Query<(&RagdollState, &Anatomy, &GlobalTransform)>,
+    ragdolls: Query<(&RagdollState, &Anatomy)>,
+    tracks: Tracks,
 ) {
     for push in pushes.read() {
-        let Ok((key, anatomy, track)) = ragdolls.get(push.ragdoll) else { continue };
+        let Ok((key, anatomy)) = ragdolls.get(push.ragdoll) else { continue };
+        let Some(track) = tracks.get(push.ragdoll) else { continue };
         if push.body == 0 || push.body >= anatomy.model.bodies.len() || !push.force.is_finite() {
             continue;
         }
@@ -320,14 +330,14 @@ pub(crate) fn face_targets(
     mut began: MessageReader<EpisodeBegan>,
     mut reached: MessageWriter<TargetReached>,
     mut arrived: Local<Vec<(Entity, u64)>>,
-    mut ragdolls: Query<(Entity, &RagdollState, &Anatomy, &Target, &Episode, &mut Transform)>,
+    mut ragdolls: Query<(Entity, &RagdollState, &Anatomy, &Target, &Episode, &mut Track)>,
 ) {
     for event in began.read() {
         if let Ok((.., target, _, mut track)) = ragdolls.get_mut(event.ragdoll) {
-            let way = (target.place - track.translation) * Vec3::new(1.0, 0.0, 1.0);
+            let way = (target.place - track.place().translation) * Vec3::new(1.0, 0.0, 1.0);
             if let Some(way) = way.try_normalize() {
                 // +x onto the way, about the vertical
-                track.rotation = Quat::from_rotation_y((-way.z).atan2(way.x));
+                track.face(Quat::from_rotation_y((-way.z).atan2(way.x)));
             }
         }
     }
@@ -337,7 +347,7 @@ pub(crate) fn face_targets(
         }
         let Some(sample) = marathon.slot(*key).and_then(|r| r.history.back()) else { continue };
         let Ok(pose) = Scene::pose_from_qpos(&anatomy.model, &sample.qpos) else { continue };
-        let place = track.transform_point(to_game(pose.com));
+        let place = track.place().transform_point(to_game(pose.com));
         if (place - target.place).xz().length() <= target.radius {
             arrived.retain(|(known, _)| *known != entity);
             arrived.push((entity, episode.number));
@@ -350,11 +360,11 @@ pub(crate) fn face_targets(
 pub(crate) fn show(
     marathon: Res<Marathon>,
     time: Res<Time<Fixed>>,
-    ragdolls: Query<(&RagdollState, &Anatomy)>,
+    ragdolls: Query<(&RagdollState, &Anatomy, &Track)>,
     mut parts: Query<&mut Transform, With<Part>>,
 ) {
     let now = time.elapsed() + time.overstep();
-    for (ragdoll, anatomy) in &ragdolls {
-        pose::put(anatomy, marathon.places(ragdoll, now), &mut parts);
+    for (ragdoll, anatomy, track) in &ragdolls {
+        pose::put(anatomy, track, marathon.places(ragdoll, now), &mut parts);
     }
 }

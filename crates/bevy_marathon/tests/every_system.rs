@@ -94,11 +94,12 @@ fn a_tick_knows_the_places_that_a_frame_does_not_show() {
         // at the time of the frame they are what it shows
         let time = app.world().resource::<Time<Fixed>>();
         let now = time.elapsed() + time.overstep();
-        let (anatomy, state) = app.world_mut().query::<(&Anatomy, &RagdollState)>().single(app.world()).expect("one");
+        let (anatomy, state, track) =
+            app.world_mut().query::<(&Anatomy, &RagdollState, &Track)>().single(app.world()).expect("one");
         let places = app.world().resource::<Marathon>().places(state, now).expect("it is simulated");
         assert_eq!(places.len(), anatomy.model.bodies.len());
         for (part, place) in anatomy.parts.iter().zip(&places) {
-            assert_eq!(app.world().get::<Transform>(*part), Some(place));
+            assert_eq!(app.world().get::<Transform>(*part), Some(&(track.inverse() * *place)));
         }
         assert!(app.world_mut().despawn(ragdoll));
         std::mem::take(&mut app.world_mut().resource_mut::<Ticks>().0)

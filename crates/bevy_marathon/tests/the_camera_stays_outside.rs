@@ -105,7 +105,7 @@ fn play(
             let world = app.world();
             let at = world.get::<Transform>(player.camera).expect("it is there").translation;
             assert!(at.is_finite(), "{at}");
-            let track = world.get::<Transform>(player.character).expect("it is there").compute_affine().inverse();
+            let track = world.get::<Track>(player.character).expect("it is there").place().compute_affine().inverse();
             let camera = world.get::<FollowCamera>(player.camera).expect("it is there");
             check(world, player.character, track.transform_point3(at), camera.distance);
         }

@@ -241,11 +241,11 @@ fn marathon_man_goes_as_the_stick_says() {
 
 /// Place and velocity along the ground of the only character.
 fn motion(app: &mut App) -> (Vec3, Vec3) {
-    let mut query = app.world_mut().query_filtered::<(&RagdollState, &Transform), With<Actor>>();
+    let mut query = app.world_mut().query_filtered::<(&RagdollState, &Track), With<Actor>>();
     let (key, track) = query.single(app.world()).expect("one character");
     let state = app.world().resource::<Marathon>().state(key).expect("it is simulated");
     let at = |v: &[f64]| bevy_marathon::axes::to_game([v[0], v[1], 0.0]);
-    (track.transform_point(at(&state.qpos)), track.rotation * at(&state.qvel))
+    (track.place().transform_point(at(&state.qpos)), track.place().rotation * at(&state.qvel))
 }
 
 /// The only camera, and where it is.

@@ -3,6 +3,7 @@
 use crate::axes::{place_to_game, to_game};
 use crate::look::{TINTS, ground};
 use crate::ragdoll::{Anatomy, OwnGround, Part, Ragdoll};
+use crate::track::Track;
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::visibility::NoFrustumCulling;
 use bevy::light::NotShadowCaster;
@@ -101,7 +102,7 @@ fn dress(
     mut materials: ResMut<Assets<StandardMaterial>>,
     mut images: ResMut<Assets<Image>>,
     adapter: Option<Res<RenderAdapterInfo>>,
-    new: Query<(Entity, &Anatomy, &Transform, Option<&OwnGround>, Option<&Tint>), Added<Anatomy>>,
+    new: Query<(Entity, &Anatomy, &Track, Option<&OwnGround>, Option<&Tint>), Added<Anatomy>>,
 ) {
     for (ragdoll, anatomy, track, own, tint) in &new {
         let model = &*anatomy.model;
@@ -151,7 +152,7 @@ fn dress(
 
 /// Draws ground that has changed.
 fn lay(
-    changed: Query<(Entity, &Anatomy, &Transform, &OwnGround), Changed<OwnGround>>,
+    changed: Query<(Entity, &Anatomy, &Track, &OwnGround), Changed<OwnGround>>,
     shapes: Query<(&Shape, &Mesh3d)>,
     mut meshes: ResMut<Assets<Mesh>>,
 ) {
@@ -168,13 +169,13 @@ fn lay(
 }
 
 /// The surface of a geom, if it is a height field, as its agent has it, or else its model.
-fn surface(model: &Model, geom: &Geom, track: &Transform, own: Option<&OwnGround>) -> Option<Mesh> {
+fn surface(model: &Model, geom: &Geom, track: &Track, own: Option<&OwnGround>) -> Option<Mesh> {
     let number = geom.hfield?;
     let field = model.hfields.get(number)?;
     Some(terrain(
         field,
         own.and_then(|own| own.0.get(number)).map(Vec::as_slice),
-        track.translation + to_game(geom.pos),
+        track.place().translation + to_game(geom.pos),
     ))
 }
 

@@ -5,6 +5,7 @@ use crate::look::orbit::{Motion, Sight};
 use crate::look::quality::{HORIZON, Quality};
 use crate::plugin::MarathonSystems;
 use crate::ragdoll::{Anatomy, Episode, OwnGround, Part};
+use crate::track::Track;
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::prelude::*;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_3, PI};
@@ -275,7 +276,7 @@ fn follow(
     time: Res<Time<Real>>,
     game: Res<Time<Virtual>>,
     mut cameras: Query<(&mut FollowCamera, &mut Transform, &mut Projection), Without<Part>>,
-    ragdolls: Query<(&Anatomy, &Transform, Option<&Episode>, Option<&OwnGround>), Without<FollowCamera>>,
+    ragdolls: Query<(&Anatomy, (&Transform, &Track), Option<&Episode>, Option<&OwnGround>), Without<FollowCamera>>,
     parts: Query<&Transform, (With<Part>, Without<FollowCamera>)>,
 ) {
     for (mut camera, mut transform, mut projection) in &mut cameras {
@@ -283,10 +284,10 @@ fn follow(
         let target = camera.target.and_then(|target| Some((target, ragdolls.get(target).ok()?)));
         let part = |part: Entity| parts.get(part).ok().copied();
         let (mut obstacles, mut sight) = (Obstacles::default(), Sight::nothing(time.delta_secs()));
-        if let Some((target, (anatomy, track, episode, own))) = target {
-            obstacles = Obstacles::of(anatomy, own, track, part);
-            sight.target(target, anatomy, track, episode, part);
-            sight.lead(track.rotation * Vec3::X * camera.ahead);
+        if let Some((target, (anatomy, (ragdoll, track), episode, own))) = target {
+            obstacles = Obstacles::of(anatomy, own, ragdoll, part);
+            sight.target(target, anatomy, ragdoll, episode, part);
+            sight.lead(track.place().rotation * Vec3::X * camera.ahead);
         }
         sight.game_dt = game.delta_secs();
         *transform = match camera.mode {

@@ -5,6 +5,7 @@ use crate::look::body::{Shape, Wardrobe, visible};
 use crate::marathon::{Marathon, RagdollState};
 use crate::plugin::MarathonSystems;
 use crate::ragdoll::Anatomy;
+use crate::track::Track;
 use bevy::light::NotShadowCaster;
 use bevy::prelude::*;
 use marathon_physics::Model;
@@ -108,7 +109,7 @@ fn haunt(
     mut wardrobe: Option<ResMut<Wardrobe>>,
     mut meshes: Option<ResMut<Assets<Mesh>>>,
     mut materials: Option<ResMut<Assets<StandardMaterial>>>,
-    ragdolls: Query<(Entity, &RagdollState, &Anatomy, &Ghost)>,
+    ragdolls: Query<(Entity, &RagdollState, &Anatomy, (&Ghost, &Track))>,
     bodies: Query<(Entity, &GhostBody)>,
     mut transforms: Query<&mut Transform>,
 ) {
@@ -117,11 +118,12 @@ fn haunt(
             commands.entity(entity).despawn();
         }
     }
-    for (ragdoll, state, anatomy, ghost) in &ragdolls {
+    for (ragdoll, state, anatomy, (ghost, track)) in &ragdolls {
+        let at = track.inverse() * Transform::from_translation(ghost.0);
         let Some(places) = marathon.clip_places(state, now(&time)) else { continue };
         if let Some((root, body)) = bodies.iter().find(|(_, body)| body.ragdoll == ragdoll) {
             if let Ok(mut transform) = transforms.get_mut(root) {
-                transform.translation = ghost.0;
+                *transform = at;
             }
             for (part, place) in body.parts.iter().zip(places) {
                 if let Ok(mut transform) = transforms.get_mut(*part) {
@@ -133,8 +135,8 @@ fn haunt(
         let (Some(wardrobe), Some(meshes), Some(materials)) = (&mut wardrobe, &mut meshes, &mut materials) else {
             return;
         };
-        let at = (Name::new("ghost"), Transform::from_translation(ghost.0), Visibility::default());
-        let root = commands.spawn((at, ChildOf(ragdoll))).id();
+        let name = (Name::new("ghost"), at, Visibility::default());
+        let root = commands.spawn((name, ChildOf(ragdoll))).id();
         let part = |place: Transform| commands.spawn((place, Visibility::default(), ChildOf(root))).id();
         let parts: Vec<Entity> = places.into_iter().map(part).collect();
         let [r, g, b, alpha] = GHOST;

@@ -5,6 +5,7 @@ use crate::look::joint_places;
 use crate::marathon::{Marathon, RagdollState};
 use crate::pose;
 use crate::ragdoll::{Anatomy, Episode, Part, Target};
+use crate::track::Track;
 use bevy::platform::cell::SyncCell;
 use bevy::prelude::*;
 use marathon_envs::CommandRange;
@@ -96,9 +97,10 @@ fn contacts(
     marathon: Res<Marathon>,
     mut probe: ResMut<Probe>,
     mut gizmos: Gizmos,
-    ragdolls: Query<(&RagdollState, &Anatomy, &Marks, &GlobalTransform)>,
+    ragdolls: Query<(&RagdollState, &Anatomy, &Marks, (&GlobalTransform, &Track))>,
 ) {
-    for (key, anatomy, marks, track) in &ragdolls {
+    for (key, anatomy, marks, (place, track)) in &ragdolls {
+        let track = *place * track.inverse();
         let Some(sample) = marathon.history(key).and_then(VecDeque::back) else { continue };
         if marks.ring
             && let Ok(pose) = marathon_render::Scene::pose_from_qpos(&anatomy.model, &sample.qpos)
@@ -183,12 +185,14 @@ pub fn commanded_velocity(ranges: &[CommandRange], command: &[f64]) -> Option<[f
     Some([ahead, speeds.next().unwrap_or(0.0), turn])
 }
 
+#[expect(clippy::type_complexity, reason = "a query names what it reads")]
 fn told(
     marathon: Res<Marathon>,
     mut gizmos: Gizmos,
-    ragdolls: Query<(&RagdollState, &Anatomy, &Marks, &Episode, &GlobalTransform)>,
+    ragdolls: Query<(&RagdollState, &Anatomy, &Marks, &Episode, (&GlobalTransform, &Track))>,
 ) {
-    for (key, anatomy, _, episode, track) in ragdolls.iter().filter(|(_, _, marks, ..)| marks.command) {
+    for (key, anatomy, _, episode, (place, track)) in ragdolls.iter().filter(|(_, _, marks, ..)| marks.command) {
+        let track = *place * track.inverse();
         let ranges = anatomy.spec.as_ref().map_or(&[][..], |spec| &spec.command);
         let Some([ahead, left, turn]) = commanded_velocity(ranges, &episode.command) else { continue };
         let Some(sample) = marathon.history(key).and_then(VecDeque::back) else { continue };

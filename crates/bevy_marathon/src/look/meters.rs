@@ -2,6 +2,7 @@
 
 use crate::look::FollowCamera;
 use crate::ragdoll::Anatomy;
+use crate::track::Track;
 use bevy::asset::RenderAssetUsages;
 use bevy::light::NotShadowCaster;
 use bevy::mesh::{Indices, PrimitiveTopology};
@@ -92,7 +93,7 @@ pub(crate) fn paint(
     mut materials: ResMut<Assets<StandardMaterial>>,
     mut paint: Local<Option<Handle<StandardMaterial>>>,
     cameras: Query<&FollowCamera>,
-    tracks: Query<(&Transform, &Anatomy)>,
+    tracks: Query<(&Track, &Anatomy)>,
     mut meters: Query<(Entity, &Meter, &mut Transform), Without<Anatomy>>,
 ) {
     let target = cameras.iter().next().and_then(|c| Some((c, tracks.get(c.target?).ok()?)));
@@ -102,6 +103,7 @@ pub(crate) fn paint(
         meters.iter().for_each(|(entity, ..)| commands.entity(entity).despawn());
         return;
     };
+    let track = track.place();
     let here = track.compute_affine().inverse().transform_point3(camera.focus).x;
     let nearest = (here / EVERY as f32).round() as i32;
     let wanted = (nearest - AROUND)..=(nearest + AROUND);

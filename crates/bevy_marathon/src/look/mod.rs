@@ -10,6 +10,7 @@ mod foot_lock;
 mod generated;
 mod ghost;
 mod ground;
+mod lens;
 mod marks;
 mod meters;
 mod obstacle;

@@ -72,12 +72,12 @@ impl Sight {
         Sight { dt, game_dt: dt, heading: None, seen: None }
     }
 
-    /// A ragdoll. `track` is its transform, `part` that of one of its bodies.
+    /// A character. `ragdoll` is its transform, `part` that of one of its bodies.
     pub fn target(
         &mut self,
         target: Entity,
         anatomy: &Anatomy,
-        track: &Transform,
+        ragdoll: &Transform,
         episode: Option<&Episode>,
         part: impl Fn(Entity) -> Option<Transform>,
     ) {
@@ -86,7 +86,7 @@ impl Sight {
         let Some(root) = anatomy.parts.get(body).and_then(|entity| part(*entity)) else { return };
         // a planar root may begin at any height
         let rest = to_game(model.bodies[body].pos).y.abs();
-        let facing = track.rotation * root.rotation;
+        let facing = ragdoll.rotation * root.rotation;
         // in a flip, or on the ground, a character faces nowhere
         if (facing * Vec3::Y).y > UPRIGHT {
             let forward = facing * Vec3::X;
@@ -94,7 +94,7 @@ impl Sight {
         }
         self.seen = Some(Seen {
             target,
-            root: track.transform_point(root.translation),
+            root: ragdoll.transform_point(root.translation),
             above: (ABOVE * rest).clamp(ABOVE_LIMITS[0], ABOVE_LIMITS[1]),
             airborne: !anatomy.feet.is_empty() && episode.is_some_and(|episode| episode.feet == 0 && !episode.down),
             lead: Vec3::ZERO,

@@ -1,7 +1,7 @@
 //! Ground, sky and sun.
 
 use crate::look::quality::{HORIZON, Quality};
-use crate::look::{FollowCamera, blobs, effects, ground, meters};
+use crate::look::{FollowCamera, blobs, effects, ground, lens, meters};
 use crate::ragdoll::Anatomy;
 use bevy::asset::RenderAssetUsages;
 use bevy::light::{
@@ -37,6 +37,7 @@ impl Plugin for SceneryPlugin {
     fn build(&self, app: &mut App) {
         app.insert_resource(self.0);
         effects::plugin(app);
+        lens::plugin(app);
         blobs::plugin(app);
         app.register_type::<Quality>()
             .insert_resource(ClearColor(Color::srgb_from_array(HORIZON)))

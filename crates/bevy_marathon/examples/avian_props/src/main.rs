@@ -72,7 +72,7 @@ fn follow(
     mut commands: Commands,
     time: Res<Time>,
     marathon: Res<Marathon>,
-    ragdolls: Query<(&RagdollState, &GlobalTransform)>,
+    ragdolls: Query<(&RagdollState, &Track)>,
     mut shadows: Query<(Entity, &Shadow, &mut Position, &mut Rotation, &mut LinearVelocity, &mut AngularVelocity)>,
 ) {
     let rate = 1.0 / time.delta_secs();
@@ -84,7 +84,7 @@ fn follow(
         };
         let places = || marathon.places(state, time.elapsed()).unwrap_or_default();
         let Some(part) = known.entry(shadow.ragdoll).or_insert_with(places).get(shadow.body) else { continue };
-        let goal = (*track * *part * shadow.place).compute_transform();
+        let goal = track.place() * *part * shadow.place;
         velocity.0 = (goal.translation - position.0) * rate;
         spin.0 = (goal.rotation * rotation.0.inverse()).to_scaled_axis() * rate;
         // a new episode starts in another place; that jump must not hit anything

@@ -8,7 +8,7 @@ use bevy::math::primitives::InfinitePlane3d;
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, LayerId, Order, Pos2};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
-use bevy_marathon::{Anatomy, Marathon, MarathonSystems, Push, RagdollState};
+use bevy_marathon::{Anatomy, Marathon, MarathonSystems, Push, RagdollState, Track};
 use marathon_physics::Model;
 use std::time::Duration;
 
@@ -105,7 +105,7 @@ fn pull(
     time: Res<Time<Fixed>>,
     marathon: Res<Marathon>,
     mut dragged: ResMut<Dragged>,
-    ragdolls: Query<(&RagdollState, &Anatomy, &GlobalTransform)>,
+    ragdolls: Query<(&RagdollState, &Anatomy, &Track)>,
     mut pushes: MessageWriter<Push>,
 ) {
     let Ok((state, anatomy, track)) = ragdolls.get(dragged.ragdoll) else { return };
@@ -124,7 +124,7 @@ fn pull(
     }
     let places = marathon.places(state, latest.max(time.elapsed())).unwrap_or_default();
     let Some(part) = places.get(dragged.body) else { return };
-    let at = (*track * *part).transform_point(dragged.grip);
+    let at = (track.place() * *part).transform_point(dragged.grip);
     let dt = anatomy.dt as f32;
     let first = dragged.until == Duration::ZERO;
     let velocity = if first { Vec3::ZERO } else { (at - dragged.held) / (dt * decisions as f32) };

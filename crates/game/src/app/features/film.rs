@@ -16,7 +16,7 @@ use crate::app::stage::scenario::LoadScenario;
 use crate::app::stage::skin::SkinChoice;
 use bevy::prelude::*;
 use bevy_marathon::look::{CameraMode, FollowCamera};
-use bevy_marathon::{Anatomy, Episode, Marathon, MarathonSystems, RagdollState};
+use bevy_marathon::{Anatomy, Episode, Marathon, MarathonSystems, RagdollState, Track};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -85,7 +85,7 @@ fn remember(
     mut reel: ResMut<FilmReel>,
     (mode, loaded): (Res<State<Mode>>, Res<LoadedPolicy>),
     marathon: Res<Marathon>,
-    actors: Query<(&Actor, &RagdollState, &Episode, &Anatomy, &Transform)>,
+    actors: Query<(&Actor, &RagdollState, &Episode, &Anatomy, &Track)>,
 ) {
     if *mode == Mode::Testbed {
         return;
@@ -93,7 +93,7 @@ fn remember(
     let mut all: Vec<_> = actors.iter().collect();
     all.sort_by_key(|(actor, ..)| actor.0);
     let Some((.., anatomy, _)) = all.first() else { return };
-    let tracks = all.iter().map(|(.., track)| *track);
+    let tracks = all.iter().map(|(.., track)| track.place());
     let tape = reel.tape.get_or_insert_with(|| Tape::new(&loaded, anatomy.dt, tracks));
     let rows: Vec<_> = all.iter().map(|(_, state, episode, anatomy, _)| (*state, *episode, *anatomy)).collect();
     tape.append(&marathon, &rows);

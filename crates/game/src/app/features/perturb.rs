@@ -13,7 +13,7 @@ use bevy::prelude::*;
 use bevy_egui::egui::{RichText, Slider};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
 use bevy_marathon::look::FollowCamera;
-use bevy_marathon::{Anatomy, Episode, Marathon, MarathonSystems, Part, Physique, Push, Ragdoll, RagdollState};
+use bevy_marathon::{Anatomy, Episode, Marathon, MarathonSystems, Part, Physique, Push, Ragdoll, RagdollState, Track};
 use marathon_physics::{Model, Variation};
 
 /// Seconds that a push lasts.
@@ -168,7 +168,7 @@ fn push_focus(
     mut actions: MessageReader<ActionPressed>,
     (mode, focus): (Res<State<Mode>>, Res<Focus>),
     perturbations: Res<Perturbations>,
-    actors: Query<(Entity, &Actor, &Anatomy, &Transform)>,
+    actors: Query<(Entity, &Actor, &Anatomy, &Track)>,
     mut pushes: MessageWriter<Push>,
     mut forwards: Local<bool>,
 ) {
@@ -176,7 +176,7 @@ fn push_focus(
         let Some((ragdoll, _, anatomy, track)) = actors.iter().find(|(_, a, ..)| a.0 == focus.0) else { continue };
         let body = anatomy.model.joints.first().map_or(1, |j| j.body);
         *forwards = !*forwards;
-        let way = track.rotation * Vec3::X * if *forwards { 1.0 } else { -1.0 };
+        let way = track.place().rotation * Vec3::X * if *forwards { 1.0 } else { -1.0 };
         let force = way * push_of(&anatomy.model, perturbations.push);
         info!("pushed");
         pushes.write(Push { ragdoll, body, force, at: None, seconds: PUSH_SECONDS });
@@ -190,7 +190,7 @@ fn throw(
     mut actions: MessageReader<ActionPressed>,
     perturbations: Res<Perturbations>,
     camera: Query<(&FollowCamera, &Transform)>,
-    actors: Query<(&Actor, &Anatomy, &RagdollState, &Transform, &Episode), Without<FollowCamera>>,
+    actors: Query<(&Actor, &Anatomy, &RagdollState, &Track, &Episode)>,
     (marathon, time): (Res<Marathon>, Res<Time<Fixed>>),
     (mode, focus): (Res<State<Mode>>, Res<Focus>),
     mut meshes: Option<ResMut<Assets<Mesh>>>,
@@ -204,10 +204,10 @@ fn throw(
         let trunk = runner.and_then(|(_, anatomy, state, track, _)| {
             let root = anatomy.model.joints.first().map_or(1, |j| j.body);
             let places = marathon.places(state, time.elapsed() + time.overstep())?;
-            Some(track.transform_point(places.get(root)?.translation))
+            Some(track.place().transform_point(places.get(root)?.translation))
         });
         let there = trunk.unwrap_or(camera.focus);
-        let moving = runner.map_or(Vec3::ZERO, |(.., track, episode)| track.rotation * Vec3::X * episode.speed);
+        let moving = runner.map_or(Vec3::ZERO, |(.., track, episode)| track.place().rotation * Vec3::X * episode.speed);
         let from = at.translation + at.rotation * Vec3::new(0.25, -0.15, -0.4);
         let seconds = (from.distance(there) / BALL_SPEED).max(1e-3);
         // aim higher from afar, so that the ball does not fall short
@@ -234,7 +234,7 @@ fn fly(
     perturbations: Res<Perturbations>,
     mut balls: Query<(Entity, &mut Ball, &mut Transform), Without<Part>>,
     marathon: Res<Marathon>,
-    actors: Query<(Entity, &Anatomy, &RagdollState, &GlobalTransform, &Episode), With<Ragdoll>>,
+    actors: Query<(Entity, &Anatomy, &RagdollState, &Track, &Episode), With<Ragdoll>>,
     (mut pushes, mut sounds): (MessageWriter<Push>, MessageWriter<PlaySound>),
 ) {
     if balls.is_empty() {
@@ -244,7 +244,7 @@ fn fly(
     // a frame may have many ticks: where the bodies are in this one is not in their transforms
     let rods = actors.iter().flat_map(|(ragdoll, anatomy, state, track, _)| {
         let places = marathon.places(state, time.elapsed()).unwrap_or_default();
-        rods(ragdoll, anatomy, |body| Some(*track * *places.get(body)?))
+        rods(ragdoll, anatomy, |body| Some(GlobalTransform::from(track.place()) * *places.get(body)?))
     });
     let rods: Vec<Rod> = rods.collect();
     for (entity, mut ball, mut transform) in &mut balls {
@@ -269,7 +269,7 @@ fn fly(
                 let (Some(normal), true) = (apart.try_normalize(), depth > 0.0) else { continue };
                 let Ok((_, anatomy, _, track, episode)) = actors.get(rod.ragdoll) else { continue };
                 // the body moves about as the whole character does
-                let moving = track.rotation() * Vec3::X * episode.speed;
+                let moving = track.place().rotation * Vec3::X * episode.speed;
                 transform.translation += normal * depth;
                 let closing = (ball.velocity - moving).dot(normal);
                 if closing >= 0.0 {

@@ -3,7 +3,7 @@
 use crate::app::stage::actors::Actor;
 use bevy::prelude::*;
 use bevy_marathon::look::{FollowCamera, Marks, Tint};
-use bevy_marathon::{Anatomy, Episode, OwnGround, Part, pose};
+use bevy_marathon::{Anatomy, Episode, OwnGround, Part, Track, pose};
 use marathon_envs::Spec;
 use marathon_physics::Model;
 use marathon_render::Scene;
@@ -48,7 +48,8 @@ pub fn spawn(
     cameras: &mut Query<&mut FollowCamera>,
 ) {
     for (number, place) in places.enumerate() {
-        let here = (Actor(number), Transform::from_translation(place), Visibility::default());
+        let place = Transform::from_translation(place);
+        let here = (Actor(number), place, Track::at(place), Visibility::default());
         let puppet = commands.spawn((here, Marks::default(), Episode::default(), OwnGround::default())).id();
         let parts = pose::spawn_parts(commands, &kind.model, puppet);
         let (model, spec) = (kind.model.clone(), kind.spec.clone());
@@ -65,6 +66,6 @@ pub fn spawn(
 }
 
 /// Moves the parts of a puppet.
-pub fn pose(anatomy: &Anatomy, qpos: &[f64], parts: &mut Query<&mut Transform, With<Part>>) {
-    pose::put(anatomy, pose::places(&anatomy.model, qpos), parts);
+pub fn pose(anatomy: &Anatomy, track: &Track, qpos: &[f64], parts: &mut Query<&mut Transform, With<Part>>) {
+    pose::put(anatomy, track, pose::places(&anatomy.model, qpos), parts);
 }

@@ -12,7 +12,7 @@ use bevy::window::PrimaryWindow;
 use bevy_egui::input::EguiWantsInput;
 use bevy_marathon::axes::to_game;
 use bevy_marathon::look::FollowCamera;
-use bevy_marathon::{Anatomy, Episode, Held, OwnGround};
+use bevy_marathon::{Anatomy, Episode, Held, OwnGround, Track};
 use marathon_envs::agents::marathon::terrain::course::{CELL, FARTHEST, FROM, LEVEL_TO, POINTS};
 
 /// Steps up, and as many down.
@@ -98,14 +98,14 @@ fn site<'a>(
     scenario: &Scenario,
     runs: &Runs,
     focus: &Focus,
-    mut actors: impl Iterator<Item = (Entity, &'a Actor, &'a Anatomy, &'a Episode, &'a OwnGround, &'a Transform)>,
-) -> Option<(Site, &'a Transform)> {
+    mut actors: impl Iterator<Item = (Entity, &'a Actor, &'a Anatomy, &'a Episode, &'a OwnGround, &'a Track)>,
+) -> Option<(Site, Transform)> {
     let (ragdoll, _, anatomy, episode, ground, track) = actors.find(|(_, actor, ..)| actor.0 == focus.0)?;
     let spec = anatomy.spec.as_ref()?;
     let farthest = spec.info.iter().position(|name| name == "distance").and_then(|i| episode.info.get(i));
     let start = runs.start(ragdoll).unwrap_or_default();
     let farthest = farthest.map_or(start, |x| f64::from(*x));
-    Some((Site::of(farthest, start, ground.0.first()?, scenario.course.difficulty)?, track))
+    Some((Site::of(farthest, start, ground.0.first()?, scenario.course.difficulty)?, track.place()))
 }
 
 /// Sets the step by mouse and keys.
@@ -118,7 +118,7 @@ fn choose(
     (scenario, focus, runs): (Res<Scenario>, Res<Focus>, Res<Runs>),
     window: Query<&Window, With<PrimaryWindow>>,
     camera: Query<(&Camera, &GlobalTransform), With<FollowCamera>>,
-    actors: Query<(Entity, &Actor, &Anatomy, &Episode, &OwnGround, &Transform)>,
+    actors: Query<(Entity, &Actor, &Anatomy, &Episode, &OwnGround, &Track)>,
     mut scrolled: Local<f32>,
     mut step: ResMut<Step>,
 ) {
@@ -167,7 +167,7 @@ fn hold(step: Res<Step>, mut actors: Query<&mut Held, With<Actor>>) {
 /// Draws where the next meter will be: the chosen step, and how far up and down it can go.
 fn mark(
     (scenario, focus, runs, step): (Res<Scenario>, Res<Focus>, Res<Runs>, Res<Step>),
-    actors: Query<(Entity, &Actor, &Anatomy, &Episode, &OwnGround, &Transform)>,
+    actors: Query<(Entity, &Actor, &Anatomy, &Episode, &OwnGround, &Track)>,
     mut gizmos: Gizmos,
 ) {
     let Some((site, track)) = site(&scenario, &runs, &focus, actors.iter()) else { return };

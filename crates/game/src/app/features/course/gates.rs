@@ -5,7 +5,7 @@ use crate::app::mode::{AppSet, Mode};
 use crate::app::stage::actors::{Actor, Focus};
 use crate::app::stage::scenario::Scenario;
 use bevy::prelude::*;
-use bevy_marathon::Ragdoll;
+use bevy_marathon::{Ragdoll, Track};
 
 /// Height of an arch over the start of the track, how far its posts reach into the ground, and half of its width, m.
 const SIZE: [f32; 3] = [3.2, 3.0, 2.0];
@@ -57,7 +57,7 @@ fn build(mut commands: Commands, mut meshes: ResMut<Assets<Mesh>>, mut materials
 #[allow(clippy::type_complexity, reason = "a query names what it reads")]
 fn follow(
     (focus, scenario): (Res<Focus>, Res<Scenario>),
-    actors: Query<(&Actor, &Transform), (With<Ragdoll>, Without<Gate>)>,
+    actors: Query<(&Actor, &Track), With<Ragdoll>>,
     mut gates: Query<(&Gate, &mut Transform, &mut Visibility)>,
 ) {
     let track = actors.iter().find(|(actor, _)| actor.0 == focus.0).filter(|_| !scenario.is_built());
@@ -66,7 +66,7 @@ fn follow(
         visibility.set_if_neq(wanted);
         if let Some((_, track)) = track {
             let distance = gate.number.checked_sub(1).map_or(0.0, |i| GATES[i]);
-            place.set_if_neq(*track * Transform::from_xyz(distance as f32, 0.0, 0.0));
+            place.set_if_neq(track.place() * Transform::from_xyz(distance as f32, 0.0, 0.0));
         }
     }
 }

@@ -12,6 +12,7 @@ use crate::app::stage::scenario::{LoadScenario, Scenario};
 use bevy::prelude::*;
 use bevy_marathon::{
     Anatomy, End, Episode, EpisodeEnded, Ground, Marathon, MarathonSystems, RagdollState, RestartNow, TRACK_HALF_WIDTH,
+    Track,
 };
 use marathon_envs::agents::marathon::terrain::course::TO;
 use marathon_envs::options::Value;
@@ -177,7 +178,7 @@ fn follow(
     mut runs: ResMut<Runs>,
     mut notes: ResMut<Notifications>,
     mut ended: MessageReader<EpisodeEnded>,
-    actors: Query<(Entity, &Actor, &RagdollState, &Anatomy, &Transform, &Episode)>,
+    actors: Query<(Entity, &Actor, &RagdollState, &Anatomy, &Track, &Episode)>,
 ) {
     if *mode != Mode::Course {
         ended.clear();
@@ -193,7 +194,7 @@ fn follow(
         let until = run.as_ref().map(|run| run.until);
         for sample in history.iter().filter(|sample| until.is_none_or(|until| sample.time > until)) {
             if sample.fresh {
-                let place = track.translation.to_array().to_vec();
+                let place = track.place().translation.to_array().to_vec();
                 let recording = Recording::new(loaded.task_config.clone(), loaded.ground, anatomy.dt, place);
                 let begun = UnderWay {
                     ragdoll: entity,

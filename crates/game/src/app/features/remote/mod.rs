@@ -18,7 +18,7 @@ use crate::app::ui::hints::{KeyHints, ModeKeys};
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_marathon::look::{FollowCamera, Quality};
-use bevy_marathon::{Anatomy, Episode, Part, RagdollState};
+use bevy_marathon::{Anatomy, Episode, Part, RagdollState, Track};
 use std::time::Duration;
 
 /// The window's size that ML-Agents sends by default, pixels.
@@ -58,15 +58,16 @@ fn spawn_puppets(mut commands: Commands, source: Res<RemoteSource>, mut cameras:
 }
 
 /// Shows the newest poses.
+#[expect(clippy::type_complexity, reason = "a query names what it reads")]
 fn play(
     source: Res<RemoteSource>,
-    mut actors: Query<(&Actor, &Anatomy, &mut Episode), Without<RagdollState>>,
+    mut actors: Query<(&Actor, (&Anatomy, &Track), &mut Episode), Without<RagdollState>>,
     mut parts: Query<&mut Transform, With<Part>>,
 ) {
     let mut mailbox = mailbox::open(&source.shared);
-    for (actor, anatomy, mut episode) in &mut actors {
+    for (actor, (anatomy, track), mut episode) in &mut actors {
         let Some(pose) = mailbox.poses.get(actor.0) else { continue };
-        puppets::pose(anatomy, &pose.qpos, &mut parts);
+        puppets::pose(anatomy, track, &pose.qpos, &mut parts);
         if *episode != pose.episode {
             episode.clone_from(&pose.episode);
         }

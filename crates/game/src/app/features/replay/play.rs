@@ -14,7 +14,7 @@ use bevy::prelude::*;
 use bevy_egui::egui::{Align2, Area, Id, Slider};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
 use bevy_marathon::look::FollowCamera;
-use bevy_marathon::{Anatomy, Episode, OwnGround, Part, RagdollState, pose};
+use bevy_marathon::{Anatomy, Episode, OwnGround, Part, RagdollState, Track, pose};
 use marathon_runs::TaskConfig;
 use std::path::Path;
 use std::sync::Arc;
@@ -100,10 +100,11 @@ fn spawn_puppets(mut commands: Commands, playback: Option<ResMut<Playback>>, mut
 }
 
 /// Moves the recorded characters.
+#[expect(clippy::type_complexity, reason = "a query names what it reads")]
 fn play(
     playback: Option<ResMut<Playback>>,
     time: Res<Time<Virtual>>,
-    mut puppets: Query<(&Actor, &Anatomy, &mut Episode, &mut OwnGround), Without<RagdollState>>,
+    mut puppets: Query<(&Actor, (&Anatomy, &Track), &mut Episode, &mut OwnGround), Without<RagdollState>>,
     mut parts: Query<&mut Transform, With<Part>>,
 ) {
     let Some(mut playback) = playback else { return };
@@ -114,9 +115,9 @@ fn play(
     }
     let (recording, at) = (&playback.recording, playback.at);
     let (now, ..) = recording.between(at);
-    for (actor, anatomy, mut episode, mut ground) in &mut puppets {
+    for (actor, (anatomy, track), mut episode, mut ground) in &mut puppets {
         let qpos = recording.pose(&anatomy.model, actor.0, at);
-        puppets::pose(anatomy, &qpos, &mut parts);
+        puppets::pose(anatomy, track, &qpos, &mut parts);
         if let Some(lies) = recording.grounds(now, actor.0).filter(|lies| !Arc::ptr_eq(lies, &ground.0)) {
             ground.0 = lies.clone();
         }

@@ -16,7 +16,7 @@ use crate::app::ui::question::{AtStake, ReportSet};
 use crate::app::ui::status::StatusLines;
 use crate::app::ui::theme::BAD;
 use bevy::prelude::*;
-use bevy_marathon::{Anatomy, Episode, Marathon, MarathonSystems, RagdollState};
+use bevy_marathon::{Anatomy, Episode, Marathon, MarathonSystems, RagdollState, Track};
 use marathon_physics::budget;
 use std::path::PathBuf;
 
@@ -68,7 +68,7 @@ fn control(
     recorder: Option<Res<Recorder>>,
     mut notes: ResMut<Notifications>,
     mut requested: Local<bool>,
-    actors: Query<(&Actor, &Anatomy, &Transform), With<RagdollState>>,
+    actors: Query<(&Actor, &Anatomy, &Track), With<RagdollState>>,
 ) {
     let recordable = scenario.mode.is_simulated() && scenario.mode != Mode::Testbed;
     *requested &= recordable;
@@ -89,7 +89,7 @@ fn control(
     all.sort_by_key(|(actor, ..)| actor.0);
     let Some((_, anatomy, _)) = all.first() else { return };
     *requested = false;
-    let tracks = all.iter().map(|(.., track)| *track);
+    let tracks = all.iter().map(|(.., track)| track.place());
     commands.insert_resource(Recorder(Tape::new(&loaded, anatomy.dt, tracks)));
     notes.say("recording; the same key ends it");
 }

@@ -16,7 +16,7 @@ pub struct Tape {
 
 impl Tape {
     /// Begins with no decision of characters whose tracks begin at these places. `dt` is the time between two decisions, s.
-    pub fn new<'a>(loaded: &LoadedPolicy, dt: f64, tracks: impl Iterator<Item = &'a Transform>) -> Self {
+    pub fn new(loaded: &LoadedPolicy, dt: f64, tracks: impl Iterator<Item = Transform>) -> Self {
         let places = tracks.flat_map(|track| track.translation.to_array()).collect();
         let recording = Recording::new(loaded.task_config.clone(), loaded.ground, dt, places);
         Tape { recording, until: Duration::ZERO }
