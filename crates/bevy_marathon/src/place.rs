@@ -23,8 +23,8 @@ use bevy::prelude::*;
 pub struct CharacterPose {
     /// Position of the root body, m.
     pub position: Vec3,
-    /// Turn about the vertical from +x to the forward axis of the root body. It keeps its value while the body is far from upright, as
-    /// in a flip or on the ground.
+    /// Turn about the vertical from +x to where the root body faces. A flip forward or backward does not change it. It keeps its value
+    /// while the body is upside down.
     pub heading: Quat,
     /// Velocity of the root body, m/s.
     pub linear_velocity: Vec3,
@@ -44,10 +44,8 @@ impl CharacterPose {
     }
 }
 
-/// Height of the vertical of a root body, turned with it, from which it has a heading.
-const UPRIGHT: f32 = 0.3;
-/// Length along the ground of a forward axis that counts as vertical.
-const VERTICAL: f32 = 1e-2;
+/// Cosine of half the tilt of the root body, squared, from which it has a heading: a tilt of 120 degrees.
+const TILTED: f32 = 0.25;
 
 /// Writes where all characters are at the time that a frame shows: their poses, and the transforms of the ragdolls.
 pub(crate) fn show(
@@ -68,11 +66,11 @@ pub(crate) fn show(
         let Some(root) = pose::root_motion(model, &qpos, &qvel) else { continue };
         let (_, turn, position) = (track * root.place).to_scale_rotation_translation();
         let [linear, angular] = [root.linear, root.angular].map(|v| track.affine().transform_vector3(v));
-        let upright = pose::uprightness(model, root.place.rotation) > UPRIGHT;
-        let ahead = heading(turn).filter(|_| upright).unwrap_or(pose.heading);
-        *pose = CharacterPose { position, heading: ahead, linear_velocity: linear, angular_velocity: angular };
-        let own = heading(root.place.rotation).filter(|_| upright);
-        found.push((ragdoll, root.place.translation, own));
+        let [at_rest, ahead] = pose::rest(model);
+        let toward = |turn: Quat| Some(heading(turn * at_rest.inverse())? * ahead);
+        let world = toward(turn).unwrap_or(pose.heading);
+        *pose = CharacterPose { position, heading: world, linear_velocity: linear, angular_velocity: angular };
+        found.push((ragdoll, root.place.translation, toward(root.place.rotation)));
     }
     let mut ragdolls = places.p1();
     for (ragdoll, position, heading) in found.drain(..) {
@@ -82,8 +80,24 @@ pub(crate) fn show(
     }
 }
 
-/// Turn about the vertical of the forward axis, +x. `None` while it is vertical.
+/// The part of a turn that is about the vertical. A flip forward or backward does not change it. `None` far beyond a quarter turn, where
+/// it is no longer smooth.
 fn heading(turn: Quat) -> Option<Quat> {
-    let ahead = (turn * Vec3::X).with_y(0.0);
-    (ahead.length() > VERTICAL).then(|| Quat::from_rotation_y((-ahead.z).atan2(ahead.x)))
+    let about = Quat::from_xyzw(0.0, turn.y, 0.0, turn.w);
+    (about.length_squared() > TILTED).then(|| about.normalize())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_flip_keeps_the_heading() {
+        let heading_of = |flip: f32| heading(Quat::from_rotation_y(0.6) * Quat::from_rotation_z(flip));
+        for flip in [-6.0, -2.0, -1.0, 0.0, 1.5, 2.0, 4.5, 6.28] {
+            let turn = heading_of(flip).expect("it has one");
+            assert!(turn.angle_between(Quat::from_rotation_y(0.6)) < 1e-3, "{flip}: {turn}");
+        }
+        assert_eq!(heading_of(std::f32::consts::PI), None);
+    }
 }

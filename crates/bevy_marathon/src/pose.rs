@@ -109,10 +109,12 @@ pub fn root_motion(model: &Model, qpos: &[f64], qvel: &[f64]) -> Option<RootMoti
     Some(RootMotion { place, linear, angular })
 }
 
-/// Vertical component of the axis of the root body that is vertical in the model's reference pose: 1 as there, -1 upside down.
-pub fn uprightness(model: &Model, turn: Quat) -> f32 {
+/// Orientation of the root body in the model's reference pose, and its heading there.
+pub fn rest(model: &Model) -> [Quat; 2] {
     let rest = model.joints.first().map_or(Quat::IDENTITY, |joint| turn_to_game(model.bodies[joint.body].quat));
-    (turn * (rest.inverse() * Vec3::Y)).y
+    let ahead = (rest * Vec3::X).with_y(0.0);
+    let heading = if ahead.length() > 1e-2 { (-ahead.z).atan2(ahead.x) } else { 0.0 };
+    [rest, Quat::from_rotation_y(heading)]
 }
 
 /// Radius of a ball around the root body that holds a model in any pose, m. `None` unless all its joints belong to one tree with

@@ -24,8 +24,10 @@ const METAL: [f32; 3] = [0.20, 0.21, 0.24];
 const RUBBER: [f32; 3] = [0.11, 0.12, 0.14];
 /// Height of the sides of a height field, m.
 const SIDE: f32 = 0.5;
-/// Bend of the ground at a point from which on it is the edge of a step, m.
-const EDGE: f32 = 0.018;
+/// Bends of the ground from which on a point is the foot of a step, and at which it is darkest, m.
+const FOOT: [f32; 2] = [0.015, 0.12];
+/// The same for a brink, m: of ditches and boxes, not of stairs, whose treads would be dark on both sides.
+const BRINK: [f32; 2] = [0.18, 0.45];
 /// Brightness of such edges and of steep sides.
 const DARKEST: f32 = 0.38;
 /// Loss of brightness per meter that the ground around a point is higher.
@@ -376,17 +378,16 @@ fn terrain(field: &HField, own: Option<&[f32]>, place: Vec3) -> Mesh {
 fn shade(heights: &[f32], [rows, columns]: [usize; 2], [row, column]: [usize; 2]) -> [f32; 4] {
     let at = |r: usize, c: usize| heights[r * columns + c];
     let here = at(row, column);
-    // the bend between both neighbors, which an even slope lacks
+    // the bend between both neighbors, which an even slope lacks: above zero at the foot of a step
     let bend = |before: Option<f32>, after: Option<f32>| match (before, after) {
-        (Some(before), Some(after)) => (before - 2.0 * here + after).abs(),
+        (Some(before), Some(after)) => before - 2.0 * here + after,
         _ => 0.0,
     };
     let up = |i: usize, n: usize| (i + 1 < n).then_some(i + 1);
     let along = bend(column.checked_sub(1).map(|c| at(row, c)), up(column, columns).map(|c| at(row, c)));
     let across = bend(row.checked_sub(1).map(|r| at(r, column)), up(row, rows).map(|r| at(r, column)));
-    if along.max(across) >= EDGE {
-        return gray(DARKEST);
-    }
+    let share = |bend: f32, [least, most]: [f32; 2]| ((bend - least) / (most - least)).clamp(0.0, 1.0);
+    let edge = share(along.max(across), FOOT).max(share(-along.min(across), BRINK));
     let (mut above, mut count) = (0.0, 0.0_f32);
     for r in row.saturating_sub(AROUND)..(row + AROUND + 1).min(rows) {
         for c in column.saturating_sub(AROUND)..(column + AROUND + 1).min(columns) {
@@ -394,7 +395,8 @@ fn shade(heights: &[f32], [rows, columns]: [usize; 2], [row, column]: [usize; 2]
             count += 1.0;
         }
     }
-    gray((1.0 - HOLLOW * above / count.max(1.0)).max(DARKEST))
+    let hollow = HOLLOW * above / count.max(1.0);
+    gray((1.0 - hollow.max((1.0 - DARKEST) * edge)).max(DARKEST))
 }
 
 fn gray(x: f32) -> [f32; 4] {
