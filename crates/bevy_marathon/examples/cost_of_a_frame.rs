@@ -2,6 +2,8 @@
 //! physics and policies and the time of all other systems: the median of several rounds.
 //!
 //! `cargo run --release -p bevy_marathon --example cost_of_a_frame -- humanoid 64`
+//!
+//! With `crowd` at the end, the characters start 2 m apart and feel each other.
 
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
@@ -11,6 +13,8 @@ use std::time::Duration;
 
 const FRAMES: u32 = 240;
 const ROUNDS: usize = 7;
+/// Distance between characters that feel each other, m.
+const APART: f32 = 2.0;
 
 /// Processor time of the simulation, which nothing else runs beside.
 #[derive(Resource)]
@@ -31,6 +35,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut words = std::env::args().skip(1);
     let agent = words.next().unwrap_or_else(|| "humanoid".into());
     let number: u64 = words.next().unwrap_or_else(|| "64".into()).parse()?;
+    let crowd = match words.next().as_deref() {
+        None => false,
+        Some("crowd") => true,
+        Some(word) => return Err(format!("unknown word '{word}', expected crowd or nothing").into()),
+    };
     let file = format!("{}/../../assets/policies/{agent}.safetensors", env!("CARGO_MANIFEST_DIR"));
     let policy = marathon_learn::Policy::load(file.as_ref())?;
 
@@ -46,8 +55,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             ),
         );
     let policy = CharacterPolicy(app.world_mut().resource_mut::<Assets<PolicyAsset>>().add(policy));
+    let side = (number as f32).sqrt().ceil() as u64;
     for i in 0..number {
-        app.world_mut().spawn((Ragdoll::agent(&agent).with_seed(1, i), policy.clone()));
+        let mut character = app.world_mut().spawn((Ragdoll::agent(&agent).with_seed(1, i), policy.clone()));
+        if crowd {
+            let place = Transform::from_xyz((i % side) as f32 * APART, 0.0, (i / side) as f32 * APART);
+            character.insert((place, Collides::ALL));
+        }
     }
     // the first frames make the batches
     (0..10).for_each(|_| app.update());

@@ -32,6 +32,9 @@ impl<T: Real> Group<T> {
             return;
         }
         let all = self.obstacles.get_or_insert_with(|| Box::new(Solids::new()));
+        if all.own[lane].is_empty() && obstacles.is_empty() {
+            return;
+        }
         all.set(lane, obstacles);
         if all.is_empty() {
             self.obstacles = None;

@@ -61,7 +61,8 @@ pub(crate) struct Solids<T: Real> {
     pub own: Vec<Vec<Solid<T::Scalar>>>,
     /// By the number of the obstacle in its lane.
     pub balls: Vec<Balls<T>>,
-    moving: bool,
+    /// By lane.
+    moving: Vec<bool>,
 }
 
 /// Coordinate of the ball of an obstacle that a lane does not have: out of reach.
@@ -70,7 +71,7 @@ const NOWHERE: f64 = 1e10;
 impl<T: Real> Solids<T> {
     /// No obstacles.
     pub fn new() -> Self {
-        Solids { own: vec![Vec::new(); T::LANES], balls: Vec::new(), moving: false }
+        Solids { own: vec![Vec::new(); T::LANES], balls: Vec::new(), moving: vec![false; T::LANES] }
     }
 
     /// Whether no agent has an obstacle.
@@ -80,9 +81,12 @@ impl<T: Real> Solids<T> {
 
     /// Sets the obstacles of a lane. Their quaternions stay as they are.
     pub fn set(&mut self, lane: usize, obstacles: &[Obstacle]) {
-        self.own[lane].clear();
-        self.own[lane].extend(obstacles.iter().map(Solid::of::<T>));
-        self.surround();
+        let own = &mut self.own[lane];
+        own.clear();
+        own.extend(obstacles.iter().map(Solid::of::<T>));
+        let moves = |solid: &Solid<T::Scalar>| solid.velocity.iter().chain(&solid.spin).any(|x| T::widen(*x) != 0.0);
+        self.moving[lane] = own.iter().any(moves);
+        self.surround(lane);
     }
 
     /// The obstacles of a lane, where they are now.
@@ -107,7 +111,7 @@ impl<T: Real> Solids<T> {
 
     /// Moves all by one step of `dt` seconds.
     pub fn advance(&mut self, dt: T::Scalar) {
-        if !self.moving {
+        if !self.moving.contains(&true) {
             return;
         }
         for (lane, own) in self.own.iter_mut().enumerate() {
@@ -124,23 +128,20 @@ impl<T: Real> Solids<T> {
         }
     }
 
-    /// Computes the balls from the obstacles.
-    fn surround(&mut self) {
+    /// Computes the balls of a lane from its obstacles.
+    fn surround(&mut self, lane: usize) {
         let (zero, count) = (T::zero(), self.own.iter().map(Vec::len).max().unwrap_or(0));
         let none = Balls { center: [T::lit(NOWHERE); 3], radius: zero, velocity: [zero; 3], spin: [zero; 3] };
-        self.balls.clear();
         self.balls.resize(count, none);
-        let moves = |solid: &Solid<T::Scalar>| solid.velocity.iter().chain(&solid.spin).any(|x| T::widen(*x) != 0.0);
-        self.moving = self.own.iter().flatten().any(moves);
-        for (lane, own) in self.own.iter().enumerate() {
-            for (solid, ball) in own.iter().zip(&mut self.balls) {
-                let size = solid.size.map(T::widen);
-                ball.radius.set(lane, T::scalar(bounding_radius(solid.kind, &size)));
-                for i in 0..3 {
-                    ball.center[i].set(lane, solid.pos[i]);
-                    ball.velocity[i].set(lane, solid.velocity[i]);
-                    ball.spin[i].set(lane, solid.spin[i]);
-                }
+        let (nowhere, zero) = (T::scalar(NOWHERE), T::scalar(0.0));
+        for (number, ball) in self.balls.iter_mut().enumerate() {
+            let solid = self.own[lane].get(number);
+            let radius = solid.map(|solid| bounding_radius(solid.kind, &solid.size.map(T::widen)));
+            ball.radius.set(lane, radius.map_or(zero, T::scalar));
+            for i in 0..3 {
+                ball.center[i].set(lane, solid.map_or(nowhere, |solid| solid.pos[i]));
+                ball.velocity[i].set(lane, solid.map_or(zero, |solid| solid.velocity[i]));
+                ball.spin[i].set(lane, solid.map_or(zero, |solid| solid.spin[i]));
             }
         }
     }
