@@ -25,7 +25,7 @@ const RUBBER: [f32; 3] = [0.11, 0.12, 0.14];
 /// Height of the sides of a height field, m.
 const SIDE: f32 = 0.5;
 /// Bends of the ground from which on a point is the foot of a step, and at which it is darkest, m.
-const FOOT: [f32; 2] = [0.015, 0.12];
+const FOOT: [f32; 2] = [0.012, 0.06];
 /// The same for a brink, m: of ditches and boxes, not of stairs, whose treads would be dark on both sides.
 const BRINK: [f32; 2] = [0.18, 0.45];
 /// Brightness of such edges and of steep sides.
