@@ -16,6 +16,8 @@ use bevy_egui::input::EguiWantsInput;
 use bevy_marathon::look::{CameraMode, FollowCamera};
 use bevy_marathon::{Anatomy, MoveDirection};
 
+/// Where a free camera starts, m: at the default angles and distance from the first character.
+const FREE_START: Vec3 = Vec3::new(-1.5, 2.0, 3.4);
 /// Radians per pixel of the mouse, and per second of a stick.
 const TURN: [f32; 2] = [0.005, 2.2];
 /// Speed of a free camera, m/s, and with Shift.
@@ -61,7 +63,8 @@ pub(super) fn plugin(app: &mut App) {
 fn spawn(mut commands: Commands, chosen: Res<ChosenCamera>) {
     let mut camera = FollowCamera::default();
     camera.set_mode(chosen.0.unwrap_or_default());
-    commands.spawn((camera, PrimaryEguiContext));
+    let place = Transform::from_translation(FREE_START);
+    commands.spawn((camera, place, PrimaryEguiContext));
 }
 
 /// Puts the camera behind or beside new characters, unless the user has chosen a place.
