@@ -34,6 +34,11 @@ pub fn place_to_game(pos: [f64; 3], quat: [f64; 4]) -> Transform {
     Transform::from_translation(to_game(pos)).with_rotation(turn_to_game(quat))
 }
 
+/// Angle about the vertical from +x to the level part of a direction of the game, rad.
+pub fn yaw_of(direction: Vec3) -> f32 {
+    (-direction.z).atan2(direction.x)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,6 +1,6 @@
 //! Poses: the entities of a ragdoll's parts, and the transforms that a configuration `qpos` gives them.
 
-use crate::axes::{place_to_game, to_game, turn_to_game};
+use crate::axes::{place_to_game, to_game, turn_to_game, yaw_of};
 use crate::ragdoll::{Anatomy, Part};
 use crate::track::Track;
 use bevy::prelude::*;
@@ -113,7 +113,7 @@ pub fn root_motion(model: &Model, qpos: &[f64], qvel: &[f64]) -> Option<RootMoti
 pub fn rest(model: &Model) -> [Quat; 2] {
     let rest = model.joints.first().map_or(Quat::IDENTITY, |joint| turn_to_game(model.bodies[joint.body].quat));
     let ahead = (rest * Vec3::X).with_y(0.0);
-    let heading = if ahead.length() > 1e-2 { (-ahead.z).atan2(ahead.x) } else { 0.0 };
+    let heading = if ahead.length() > 1e-2 { yaw_of(ahead) } else { 0.0 };
     [rest, Quat::from_rotation_y(heading)]
 }
 

@@ -1,7 +1,7 @@
 //! The systems between Bevy's world and the simulation.
 
 use crate::asset::{PolicyAsset, RagdollPrefab};
-use crate::axes::{to_game, to_physics};
+use crate::axes::{to_game, to_physics, yaw_of};
 use crate::characters::{CharacterBatch, CharacterKind, Shove, Slot, spec_of_role};
 use crate::command::AgentCommand;
 use crate::error::RagdollError;
@@ -336,8 +336,7 @@ pub(crate) fn face_targets(
         if let Ok((.., target, _, mut track)) = ragdolls.get_mut(event.ragdoll) {
             let way = (target.place - track.place().translation) * Vec3::new(1.0, 0.0, 1.0);
             if let Some(way) = way.try_normalize() {
-                // +x onto the way, about the vertical
-                track.face(Quat::from_rotation_y((-way.z).atan2(way.x)));
+                track.face(Quat::from_rotation_y(yaw_of(way)));
             }
         }
     }

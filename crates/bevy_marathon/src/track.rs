@@ -29,6 +29,16 @@ impl Track {
         self.place
     }
 
+    /// The direction in which it runs, of length 1.
+    pub fn direction(&self) -> Vec3 {
+        self.place.rotation * Vec3::X
+    }
+
+    /// The transform of the ragdoll in the axes of the track.
+    pub(crate) fn own(&self) -> Transform {
+        self.own
+    }
+
     /// The track in the axes of the ragdoll: `transform * track.inverse()` is the track in the axes of `transform`. It changes with
     /// every frame.
     pub fn inverse(&self) -> Transform {
@@ -48,8 +58,8 @@ impl Track {
         }
     }
 
-    /// The transform of a ragdoll that is at a place of the track: below its root body, on the plane of the track, turned about the
-    /// vertical as it is. Without a heading, it keeps the last one.
+    /// The transform of a ragdoll whose root body is at a place of the track: below it, on the plane of the track. Without a heading,
+    /// it keeps the last one.
     pub(crate) fn go(&mut self, position: Vec3, heading: Option<Quat>) -> Transform {
         let heading = heading.unwrap_or(self.own.rotation);
         self.own = Transform::from_translation(position.with_y(0.0)).with_rotation(heading);

@@ -5,33 +5,17 @@ mod common;
 
 use bevy::prelude::*;
 use bevy_marathon::prelude::*;
-use common::{app, policy};
-use std::time::Duration;
+use common::{TICK, app, controller, run, state};
 
 type Done = Result<(), Box<dyn std::error::Error>>;
 
-const TICK: Duration = Duration::from_micros(15_625);
-
 fn character(app: &mut App, place: Transform) -> Entity {
-    let policy = PolicyAsset::from(policy("MarathonManController"));
-    let policy = CharacterPolicy(app.world_mut().resource_mut::<Assets<PolicyAsset>>().add(policy));
     let command = MoveDirection::new(0.6 * (place.rotation * Vec3::X));
-    app.world_mut().spawn((Ragdoll::agent("MarathonManController"), policy, command, Collides::ALL, place)).id()
-}
-
-fn run(app: &mut App, seconds: f32) {
-    for _ in 0..(seconds / TICK.as_secs_f32()) as usize {
-        app.update();
-    }
+    controller(app, (command, Collides::ALL, place))
 }
 
 fn get<T: Component + Clone>(app: &App, entity: Entity) -> T {
     app.world().get::<T>(entity).expect("it has one").clone()
-}
-
-fn state(app: &App, entity: Entity) -> (Vec<f64>, Vec<f64>) {
-    let key = get::<RagdollState>(app, entity);
-    app.world().resource::<Marathon>().state(&key).map(|state| (state.qpos, state.qvel)).expect("it is there")
 }
 
 /// Checks a transform against the pose, and the bodies against the physics.

@@ -5,12 +5,9 @@ mod common;
 
 use bevy::prelude::*;
 use bevy_marathon::prelude::*;
-use common::{app, policy};
-use std::time::Duration;
+use common::{TICK, app, controller, run};
 
 type Done = Result<(), Box<dyn std::error::Error>>;
-
-const TICK: Duration = Duration::from_micros(15_625);
 
 /// A ball of 1 kg.
 fn ball(app: &mut App) -> Result<Handle<RagdollPrefab>, Box<dyn std::error::Error>> {
@@ -23,21 +20,12 @@ fn ball(app: &mut App) -> Result<Handle<RagdollPrefab>, Box<dyn std::error::Erro
 
 /// A walker that the tests send along +x of the world.
 fn walker(app: &mut App, place: Vec3, collides: Collides) -> Entity {
-    let policy = PolicyAsset::from(policy("MarathonManController"));
-    let policy = CharacterPolicy(app.world_mut().resource_mut::<Assets<PolicyAsset>>().add(policy));
     let way = MoveDirection::new(Vec3::X * 0.5);
-    let ragdoll = Ragdoll::agent("MarathonManController");
-    app.world_mut().spawn((ragdoll, policy, way, collides, Transform::from_translation(place))).id()
+    controller(app, (way, collides, Transform::from_translation(place)))
 }
 
 fn place(app: &App, entity: Entity) -> Vec3 {
     app.world().get::<CharacterPose>(entity).map_or(Vec3::NAN, |pose| pose.position)
-}
-
-fn run(app: &mut App, seconds: f32) {
-    for _ in 0..(seconds / TICK.as_secs_f32()) as usize {
-        app.update();
-    }
 }
 
 fn put(app: &mut App, entity: Entity, qpos: &[f64], qvel: &[f64]) -> Done {

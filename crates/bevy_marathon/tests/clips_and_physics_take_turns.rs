@@ -6,38 +6,19 @@ mod common;
 use bevy::prelude::*;
 use bevy_marathon::MotionClip;
 use bevy_marathon::prelude::*;
-use common::{app, assets, policy};
+use common::{TICK, app, assets, controller, run, state};
 use marathon_motion::Clip;
-use std::time::Duration;
 
 type Done = Result<(), Box<dyn std::error::Error>>;
 
-const TICK: Duration = Duration::from_micros(15_625);
-
 fn character(app: &mut App, place: Vec3) -> Entity {
-    let policy = PolicyAsset::from(policy("MarathonManController"));
-    let policy = CharacterPolicy(app.world_mut().resource_mut::<Assets<PolicyAsset>>().add(policy));
-    let way = MoveDirection::default();
-    app.world_mut()
-        .spawn((Ragdoll::agent("MarathonManController"), policy, way, Transform::from_translation(place)))
-        .id()
+    controller(app, (MoveDirection::default(), Transform::from_translation(place)))
 }
 
 fn clip(app: &mut App, name: &str) -> Result<PlayClip, Box<dyn std::error::Error>> {
     let path = assets().join("motions").join(name);
     let clip = Clip::parse(&path, &std::fs::read(&path)?)?;
     Ok(PlayClip::new(app.world_mut().resource_mut::<Assets<MotionClip>>().add(MotionClip::from(clip))))
-}
-
-fn run(app: &mut App, seconds: f32) {
-    for _ in 0..(seconds / TICK.as_secs_f32()) as usize {
-        app.update();
-    }
-}
-
-fn state(app: &App, entity: Entity) -> (Vec<f64>, Vec<f64>) {
-    let key = app.world().get::<RagdollState>(entity).expect("it has entered");
-    app.world().resource::<Marathon>().state(key).map(|state| (state.qpos, state.qvel)).expect("it is there")
 }
 
 fn mode(app: &App, entity: Entity) -> RagdollMode {

@@ -1,5 +1,6 @@
 //! The systems of the plugin, one by one, in an app without a window.
 
+#[allow(dead_code, reason = "a part of it is enough")]
 mod common;
 
 use bevy::prelude::*;

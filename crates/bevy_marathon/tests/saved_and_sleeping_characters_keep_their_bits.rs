@@ -1,6 +1,7 @@
 //! A character that is saved and restored, or that sleeps and wakes up, continues with the bits that it would have had. No other
 //! character changes a bit.
 
+#[allow(dead_code, reason = "a part of it is enough")]
 mod common;
 
 use bevy::prelude::*;

@@ -2,6 +2,7 @@
 //! lengths and distances, to the last bit, whatever the frame rate, the order in which the ragdolls came, and who runs
 //! beside them.
 
+#[allow(dead_code, reason = "a part of it is enough")]
 mod common;
 
 use bevy::prelude::*;

@@ -285,9 +285,10 @@ fn follow(
         let part = |part: Entity| parts.get(part).ok().copied();
         let (mut obstacles, mut sight) = (Obstacles::default(), Sight::nothing(time.delta_secs()));
         if let Some((target, (anatomy, (ragdoll, track), episode, own))) = target {
-            obstacles = Obstacles::of(anatomy, own, ragdoll, part);
+            let along = |body: Entity| Some(track.own() * part(body)?);
+            obstacles = Obstacles::of(anatomy, own, &track.place(), along);
             sight.target(target, anatomy, ragdoll, episode, part);
-            sight.lead(track.place().rotation * Vec3::X * camera.ahead);
+            sight.lead(track.direction() * camera.ahead);
         }
         sight.game_dt = game.delta_secs();
         *transform = match camera.mode {

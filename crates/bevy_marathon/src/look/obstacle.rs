@@ -46,11 +46,11 @@ struct Field<'a> {
 }
 
 impl<'a> Obstacles<'a> {
-    /// Those of a character. `ragdoll` is its transform, `part` that of one of its bodies.
+    /// Those of a ragdoll. `track` is the place of its track, `part` that of one of its bodies along it.
     pub fn of(
         anatomy: &'a Anatomy,
         own: Option<&'a OwnGround>,
-        ragdoll: &Transform,
+        track: &Transform,
         part: impl Fn(Entity) -> Option<Transform>,
     ) -> Self {
         let model = &*anatomy.model;
@@ -63,8 +63,8 @@ impl<'a> Obstacles<'a> {
                 }
                 None => Shape::of(geom)?,
             };
-            let body = part(*anatomy.parts.get(geom.body)?)?;
-            let place = *ragdoll * body * place_to_game(geom.pos, geom.quat);
+            let body = if geom.body == 0 { Transform::default() } else { part(*anatomy.parts.get(geom.body)?)? };
+            let place = *track * body * place_to_game(geom.pos, geom.quat);
             let thin = shape.sides().is_some_and(|[a, b, _]| a < THIN && b < THIN);
             Some(Solid { inverse: place.compute_affine().inverse(), shape, thin })
         };

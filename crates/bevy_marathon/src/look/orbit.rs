@@ -2,7 +2,7 @@
 //!
 //! A half-life is the time in which half of a difference is left.
 
-use crate::axes::to_game;
+use crate::axes::{to_game, yaw_of};
 use crate::look::obstacle::Obstacles;
 use crate::ragdoll::{Anatomy, Episode};
 use bevy::prelude::*;
@@ -90,7 +90,7 @@ impl Sight {
         // in a flip, or on the ground, a character faces nowhere
         if (facing * Vec3::Y).y > UPRIGHT {
             let forward = facing * Vec3::X;
-            self.heading = Some((-forward.z).atan2(forward.x));
+            self.heading = Some(yaw_of(forward));
         }
         self.seen = Some(Seen {
             target,
@@ -206,7 +206,7 @@ impl Motion {
         if self.pause > 0.0 {
             return 0.0;
         }
-        let behind = (-self.velocity.z).atan2(self.velocity.x) - FRAC_PI_2;
+        let behind = yaw_of(self.velocity) - FRAC_PI_2;
         let [from, to] = DRIFT_FROM;
         let moves = ((self.velocity.length() - from) / (to - from)).clamp(0.0, 1.0);
         DRIFT * moves * (behind - yaw).sin() * dt

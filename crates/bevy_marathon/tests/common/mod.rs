@@ -41,6 +41,29 @@ fn listen(
     log.reached.extend(reached.read().copied());
 }
 
+/// A frame of as long as a tick.
+pub const TICK: Duration = Duration::from_micros(15_625);
+
+/// Runs frames for a while.
+pub fn run(app: &mut App, seconds: f32) {
+    for _ in 0..(seconds / TICK.as_secs_f32()) as usize {
+        app.update();
+    }
+}
+
+/// Marathon Man with his policy and what else it is given.
+pub fn controller(app: &mut App, more: impl Bundle) -> Entity {
+    let policy = PolicyAsset::from(policy("MarathonManController"));
+    let policy = CharacterPolicy(app.world_mut().resource_mut::<Assets<PolicyAsset>>().add(policy));
+    app.world_mut().spawn((Ragdoll::agent("MarathonManController"), policy, more)).id()
+}
+
+/// `qpos` and `qvel` of a ragdoll.
+pub fn state(app: &App, entity: Entity) -> (Vec<f64>, Vec<f64>) {
+    let key = app.world().get::<RagdollState>(entity).expect("it has entered");
+    app.world().resource::<Marathon>().state(key).map(|state| (state.qpos, state.qvel)).expect("it is there")
+}
+
 /// The project's assets.
 pub fn assets() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../assets")

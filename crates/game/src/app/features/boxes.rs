@@ -6,6 +6,7 @@ use crate::app::notifications::Notifications;
 use crate::app::stage::actors::{Actor, Focus};
 use crate::app::stage::scenario::LoadScenario;
 use bevy::prelude::*;
+use bevy_marathon::axes::yaw_of;
 use bevy_marathon::look::FollowCamera;
 use bevy_marathon::{CharacterPose, Collides, Ragdoll, RagdollPrefab};
 use marathon_physics::Model;
@@ -60,7 +61,7 @@ fn put(
         let ahead = cameras.iter().next().map_or(pose.forward(), |camera| *camera.forward());
         let ahead = ahead.with_y(0.0).try_normalize().unwrap_or(Vec3::X);
         // +x onto the way, about the vertical
-        let turn = Quat::from_rotation_y((-ahead.z).atan2(ahead.x));
+        let turn = Quat::from_rotation_y(yaw_of(ahead));
         let place = Transform::from_translation(pose.position.with_y(0.0) + AHEAD * ahead).with_rotation(turn);
         commands.spawn((Name::new("boxes"), Pile, Ragdoll::prefab(handle), Collides::ALL, place));
     }

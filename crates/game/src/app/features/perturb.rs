@@ -176,7 +176,7 @@ fn push_focus(
         let Some((ragdoll, _, anatomy, track)) = actors.iter().find(|(_, a, ..)| a.0 == focus.0) else { continue };
         let body = anatomy.model.joints.first().map_or(1, |j| j.body);
         *forwards = !*forwards;
-        let way = track.place().rotation * Vec3::X * if *forwards { 1.0 } else { -1.0 };
+        let way = track.direction() * if *forwards { 1.0 } else { -1.0 };
         let force = way * push_of(&anatomy.model, perturbations.push);
         info!("pushed");
         pushes.write(Push { ragdoll, body, force, at: None, seconds: PUSH_SECONDS });
@@ -207,7 +207,7 @@ fn throw(
             Some(track.place().transform_point(places.get(root)?.translation))
         });
         let there = trunk.unwrap_or(camera.focus);
-        let moving = runner.map_or(Vec3::ZERO, |(.., track, episode)| track.place().rotation * Vec3::X * episode.speed);
+        let moving = runner.map_or(Vec3::ZERO, |(.., track, episode)| track.direction() * episode.speed);
         let from = at.translation + at.rotation * Vec3::new(0.25, -0.15, -0.4);
         let seconds = (from.distance(there) / BALL_SPEED).max(1e-3);
         // aim higher from afar, so that the ball does not fall short
@@ -269,7 +269,7 @@ fn fly(
                 let (Some(normal), true) = (apart.try_normalize(), depth > 0.0) else { continue };
                 let Ok((_, anatomy, _, track, episode)) = actors.get(rod.ragdoll) else { continue };
                 // the body moves about as the whole character does
-                let moving = track.place().rotation * Vec3::X * episode.speed;
+                let moving = track.direction() * episode.speed;
                 transform.translation += normal * depth;
                 let closing = (ball.velocity - moving).dot(normal);
                 if closing >= 0.0 {
