@@ -128,7 +128,7 @@ mod tests {
     fn every_file_is_listed() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let mut folders: Vec<_> =
-            ["agents", "dm_control", "gymnasium", "motions", "skins"].map(|f| root.join(f)).into();
+            ["agents", "dm_control", "gymnasium", "motions", "props", "skins"].map(|f| root.join(f)).into();
         let mut found = 0;
         while let Some(folder) = folders.pop() {
             for entry in std::fs::read_dir(folder).expect("the folder").flatten() {

@@ -208,10 +208,11 @@ mod tests {
             ("2.5M", 2_500_000),
             ("1e6", 1_000_000),
             ("4.35M", 4_350_000),
+            ("0.4k", 400),
         ] {
             assert_eq!(parse_steps(text), Ok(steps));
         }
-        for text in ["0", "-3", "1.5", "0.4k", "1e16", "many", "", "inf", "nan", "k"] {
+        for text in ["0", "-3", "1.5", "0.0004k", "1e16", "many", "", "inf", "nan", "k"] {
             assert!(parse_steps(text).is_err(), "{text}");
         }
     }
