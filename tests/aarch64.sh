@@ -2,7 +2,7 @@
 # Runs the Python tests with a wheel for 64-bit Arm on another processor, under qemu: tests/aarch64.sh WHEEL [pytest options].
 #
 # Needs Debian or Ubuntu with Python 3.11 packages, qemu-user-static, and .venv (./test.sh makes it). Packages for Arm are only
-# unpacked, into target/aarch64. Tests that need PyTorch, ONNX Runtime, Ray or a window are left out: their packages are not
+# unpacked, into target/aarch64. Tests that need PyTorch, ONNX Runtime, dm_control, Ray or a window are left out: their packages are not
 # Marathon's, and qemu is about twenty times slower than a processor.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -42,7 +42,7 @@ run=(qemu-aarch64-static -L "$root" -E "PYTHONPATH=$site" -E MUJOCO_GL=disable -
   "$root/usr/bin/python3.11")
 "${run[@]}" -c 'import marathon_rl, platform; print(platform.machine(), marathon_rl.__version__)'
 left_out=()
-for file in $(grep -lE '^(import|from) (torch|onnx|onnxruntime|ray|stable_baselines3|rsl_rl|skrl)|importorskip|xdotool' python/tests/test_*.py); do
+for file in $(grep -lE '^(import|from) (torch|onnx|onnxruntime|dm_control|ray|stable_baselines3|rsl_rl|skrl)|importorskip|xdotool' python/tests/test_*.py); do
   left_out+=(--ignore "$file")
 done
 "${run[@]}" -m pytest --quiet -p no:cacheprovider "${left_out[@]}" "${@:-python/tests}"

@@ -1,7 +1,7 @@
-//! Characters among walls, a lift, boxes and each other: `cargo run --release -p bevy_marathon --features window --example obstacles`
+//! Characters among walls, a lift, a mound, boxes and each other: `cargo run --release -p bevy_marathon --features window --example obstacles`
 //!
-//! Eight characters walk about in a yard. They run into its walls, push boxes, are lifted by a platform, and get out of each
-//! other's way, or fall over each other and get up.
+//! Eight characters walk about in a yard. They run into its walls, push boxes, are lifted by a platform, cross a mound, and get out
+//! of each other's way, or fall over each other and get up.
 
 use bevy::prelude::*;
 use bevy_marathon::prelude::*;
@@ -13,6 +13,8 @@ const YARD: f32 = 5.0;
 const CHARACTERS: usize = 8;
 /// Seconds after which a character takes another direction.
 const WALK: f32 = 5.0;
+/// Height of the mound, m.
+const MOUND: f32 = 0.15;
 /// Height and period of the lift, m and s.
 const LIFT: (f32, f32) = (0.25, 8.0);
 
@@ -46,6 +48,12 @@ fn build(mut commands: Commands, mut meshes: ResMut<Assets<Mesh>>, mut materials
     }
     let platform = solid(Vec3::new(1.0, 0.1, 1.0), Vec3::new(2.5, -0.1, 2.5), Color::srgb(0.25, 0.45, 0.75));
     commands.entity(platform).insert(Lift);
+    // ends below the ground
+    let mound = HeightField::from_fn(Vec2::splat(3.0), [25, 25], |x, z| {
+        MOUND * (1.0 - (x * x + z * z) / 1.5_f32.powi(2)).max(-0.1)
+    });
+    let look = (Mesh3d(meshes.add(mound.mesh())), MeshMaterial3d(materials.add(Color::srgb(0.45, 0.5, 0.35))));
+    commands.spawn((Obstacle::HeightField(mound), look, Transform::from_xyz(-2.5, 0.0, -2.5)));
 }
 
 fn populate(mut commands: Commands, assets: Res<AssetServer>) {

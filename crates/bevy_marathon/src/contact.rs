@@ -152,7 +152,7 @@ fn solid_of(
     dt: f32,
 ) -> Option<Solid> {
     let (scale, turn, place) = place.to_scale_rotation_translation();
-    let (shape, radius) = obstacle.shape(scale)?;
+    let (shape, radius) = obstacle.shape(scale, &mut motion.field)?;
     if !(place.is_finite() && turn.is_finite()) {
         return None;
     }
@@ -295,7 +295,7 @@ impl Body {
         let (_, back, _) = inverse.to_scale_rotation_translation();
         let vector = |v: Vec3| to_physics(back * v);
         marathon_physics::Obstacle {
-            shape: solid.shape,
+            shape: solid.shape.clone(),
             pos: to_physics(inverse.transform_point3(place)),
             quat: turn_to_physics(back * turn),
             velocity: vector(linear),

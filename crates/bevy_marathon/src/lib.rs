@@ -58,6 +58,7 @@ mod contact;
 mod direction;
 mod error;
 mod ground;
+mod height_field;
 mod levels;
 mod limbs;
 mod lod;
@@ -85,6 +86,7 @@ pub use command::AgentCommand;
 pub use direction::MoveDirection;
 pub use error::{CommandError, RagdollError, SnapshotError, StrengthError};
 pub use ground::{Ground, TRACK_HALF_WIDTH};
+pub use height_field::HeightField;
 pub use lod::{Lod, LodByDistance};
 pub use marathon::{Marathon, RagdollState};
 pub use messages::*;
@@ -109,9 +111,10 @@ pub mod prelude {
     pub use crate::plugin::{MarathonPlugin, MarathonSystems};
     pub use crate::ragdoll::*;
     pub use crate::{
-        AgentCommand, CharacterPose, Collides, CommandError, Ground, HitReactions, LimbStrength, Lod, LodByDistance,
-        Marathon, MarathonSnapshot, MotionClip, MoveDirection, Obstacle, PlayClip, PolicyAsset, RagdollError,
-        RagdollMode, RagdollPrefab, RagdollSnapshot, RagdollState, SnapshotError, StrengthError, Track, Tracks,
+        AgentCommand, CharacterPose, Collides, CommandError, Ground, HeightField, HitReactions, LimbStrength, Lod,
+        LodByDistance, Marathon, MarathonSnapshot, MotionClip, MoveDirection, Obstacle, PlayClip, PolicyAsset,
+        RagdollError, RagdollMode, RagdollPrefab, RagdollSnapshot, RagdollState, SnapshotError, StrengthError, Track,
+        Tracks,
     };
     pub use marathon_physics::Variation;
     pub use marathon_runs::TaskConfig;

@@ -1,13 +1,15 @@
 //! Solids of the app that characters feel, and which characters feel what.
 
+use crate::height_field::{HeightField, LaneField};
 use bevy::prelude::*;
 use marathon_physics::ObstacleShape;
 
-/// A solid of the app that characters feel: a wall, a step, a platform, a body of another physics engine. It is where its
+/// A solid of the app that characters feel: a wall, a step, a platform, terrain, a body of another physics engine. It is where its
 /// [`GlobalTransform`] is, with its scale. Move it by its [`Transform`] in [`FixedUpdate`], and it pushes and carries what
 /// touches it. Characters cannot move it.
 ///
-/// Characters with [`Collides::obstacles`] feel it. It is not drawn by itself.
+/// Characters with [`Collides::obstacles`] feel it. It is not drawn by itself. An obstacle with a size that is not a length above
+/// 0 is not felt.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -18,7 +20,7 @@ use marathon_physics::ObstacleShape;
 ///     commands.spawn((Ragdoll::agent("MarathonManController"), policy, Collides::ALL));
 /// }
 /// ```
-#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
+#[derive(Component, Clone, Debug, PartialEq, Reflect)]
 #[reflect(Component, Clone, Debug, PartialEq)]
 #[require(Transform, ObstacleMotion)]
 pub enum Obstacle {
@@ -39,13 +41,20 @@ pub enum Obstacle {
         /// Half its extent along each axis, m.
         half_size: Vec3,
     },
+    /// Terrain. The agent's own floor stays where it is: terrain carries where it is higher.
+    HeightField(HeightField),
 }
 
 impl Obstacle {
     /// Its shape in the axes of the physics at a scale, and the radius of a ball around it. `None` if a size is not a length above 0.
-    pub(crate) fn shape(&self, scale: Vec3) -> Option<(ObstacleShape, f32)> {
+    /// The terrain of the last call is in `last`.
+    pub(crate) fn shape(&self, scale: Vec3, last: &mut Option<LaneField>) -> Option<(ObstacleShape, f32)> {
         let scale = scale.abs();
         let (size, shape, radius): (Vec3, _, _) = match *self {
+            Obstacle::HeightField(ref field) => {
+                let (field, radius) = field.for_lanes(scale, last)?;
+                return Some((ObstacleShape::HField(field), radius));
+            }
             Obstacle::Sphere { radius } => {
                 let radius = radius * scale.max_element();
                 (Vec3::splat(radius), ObstacleShape::Sphere { radius: radius.into() }, radius)
@@ -66,9 +75,10 @@ impl Obstacle {
 }
 
 /// Where an [`Obstacle`] was in the last tick. The plugin writes it.
-#[derive(Component, Clone, Copy, Debug, Default)]
+#[derive(Component, Clone, Debug, Default)]
 pub struct ObstacleMotion {
     pub(crate) last: Option<(Vec3, Quat)>,
+    pub(crate) field: Option<LaneField>,
 }
 
 /// Solids that a [`Ragdoll`](crate::Ragdoll) touches besides its ground: none by default. Insert it together with the
@@ -104,14 +114,15 @@ mod tests {
     #[test]
     fn shapes_have_their_scale_and_the_axes_of_the_physics() {
         let cuboid = Obstacle::Cuboid { half_size: Vec3::new(1.0, 2.0, 3.0) };
-        let (shape, radius) = cuboid.shape(Vec3::new(1.0, 1.0, -2.0)).expect("lengths above 0");
+        let shape_of = |obstacle: &Obstacle, scale: Vec3| obstacle.shape(scale, &mut None);
+        let (shape, radius) = shape_of(&cuboid, Vec3::new(1.0, 1.0, -2.0)).expect("lengths above 0");
         assert_eq!(shape, ObstacleShape::Box { half_size: [1.0, 6.0, 2.0] });
         assert_eq!(radius, 41.0_f32.sqrt());
         let capsule = Obstacle::Capsule { radius: 0.5, half_length: 1.0 };
-        let shape = capsule.shape(Vec3::new(1.0, 3.0, 2.0)).map(|(shape, _)| shape);
+        let shape = shape_of(&capsule, Vec3::new(1.0, 3.0, 2.0)).map(|(shape, _)| shape);
         assert_eq!(shape, Some(ObstacleShape::Capsule { radius: 1.0, half_length: 3.0 }));
-        assert_eq!(Obstacle::Sphere { radius: 0.0 }.shape(Vec3::ONE), None);
-        assert_eq!(Obstacle::Sphere { radius: f32::NAN }.shape(Vec3::ONE), None);
-        assert_eq!(cuboid.shape(Vec3::ZERO), None);
+        assert_eq!(shape_of(&Obstacle::Sphere { radius: 0.0 }, Vec3::ONE), None);
+        assert_eq!(shape_of(&Obstacle::Sphere { radius: f32::NAN }, Vec3::ONE), None);
+        assert_eq!(shape_of(&cuboid, Vec3::ZERO), None);
     }
 }

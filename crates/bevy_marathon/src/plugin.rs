@@ -6,6 +6,7 @@ use crate::asset::{MjcfLoader, MotionClip, MotionLoader, PolicyAsset, PolicyLoad
 use crate::command::AgentCommand;
 use crate::contact;
 use crate::direction::{self, MoveDirection};
+use crate::height_field::HeightField;
 use crate::levels;
 use crate::lod::{Lod, LodByDistance};
 use crate::marathon::Marathon;
@@ -119,6 +120,7 @@ fn register_types(app: &mut App) {
         .register_type::<LaidGround>()
         .register_type::<PlayClip>()
         .register_type::<Obstacle>()
+        .register_type::<HeightField>()
         .register_type::<Collides>()
         .register_type::<Lod>()
         .register_type::<LodByDistance>()

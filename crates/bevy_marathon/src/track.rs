@@ -35,6 +35,7 @@ impl Track {
     }
 
     /// The transform of the ragdoll in the axes of the track.
+    #[cfg(feature = "render")]
     pub(crate) fn own(&self) -> Transform {
         self.own
     }

@@ -92,6 +92,33 @@ fn a_platform_that_moves_carries() -> Done {
 }
 
 #[test]
+fn terrain_carries() -> Done {
+    let mut app = app(TICK);
+    let prefab = ball(&mut app)?;
+    // a slope that falls towards +x, turned so that it falls towards -z, and walked on by a controller beside it
+    let slope = HeightField::from_fn(Vec2::new(8.0, 4.0), [17, 9], |x, _| 0.1 * (4.0 - x));
+    let turned = Transform::from_xyz(1.0, 0.0, 0.0).with_rotation(Quat::from_rotation_y(std::f32::consts::FRAC_PI_2));
+    app.world_mut().spawn((Obstacle::HeightField(slope), turned));
+    let waves = HeightField::from_fn(Vec2::new(12.0, 4.0), [49, 5], |x, _| 0.03 * (1.0 - (2.0 * x).cos()));
+    app.world_mut().spawn((Obstacle::HeightField(waves), Transform::from_xyz(5.0, 0.0, 20.0)));
+    let collides = |x: f32, z: f32| (Collides::ALL, Transform::from_xyz(x, 0.0, z));
+    let roller = app.world_mut().spawn((Ragdoll::prefab(prefab), collides(1.0, 0.0))).id();
+    let walker = walker(&mut app, Vec3::new(0.0, 0.0, 20.0), Collides::ALL);
+    app.update();
+    put(&mut app, roller, &[0.0, 0.0, 0.62, 1.0, 0.0, 0.0, 0.0], &[0.0; 6])?;
+    run(&mut app, 1.5);
+    let way = place(&app, roller);
+    // 5/7 g sin(a) cos(a) along the slope
+    let expected = -0.5 * 5.0 / 7.0 * 9.81 * 0.1 / 1.01 * 1.5 * 1.5;
+    assert!((way.z / expected - 1.0).abs() < 0.1 && (way.x - 1.0).abs() < 0.02, "{way}, expected {expected} m along z");
+    assert!((way.y - 0.1 * (4.0 + way.z) - 0.2 * 1.01_f32.sqrt()).abs() < 0.02, "{way}");
+    run(&mut app, 3.0);
+    let walked = place(&app, walker);
+    assert!(walked.x > 1.0 && app.world().get::<Unfit>(walker).is_none(), "{walked}");
+    Ok(())
+}
+
+#[test]
 fn two_balls_share_their_momentum() -> Done {
     let mut app = app(TICK);
     let prefab = ball(&mut app)?;

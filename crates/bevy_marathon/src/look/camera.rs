@@ -3,6 +3,7 @@
 use crate::look::obstacle::Obstacles;
 use crate::look::orbit::{Motion, Sight};
 use crate::look::quality::{HORIZON, Quality};
+use crate::obstacle::Obstacle;
 use crate::plugin::MarathonSystems;
 use crate::ragdoll::{Anatomy, Episode, OwnGround, Part};
 use crate::track::Track;
@@ -278,6 +279,7 @@ fn follow(
     mut cameras: Query<(&mut FollowCamera, &mut Transform, &mut Projection), Without<Part>>,
     ragdolls: Query<(&Anatomy, (&Transform, &Track), Option<&Episode>, Option<&OwnGround>), Without<FollowCamera>>,
     parts: Query<&Transform, (With<Part>, Without<FollowCamera>)>,
+    app: Query<(&Obstacle, &GlobalTransform)>,
 ) {
     for (mut camera, mut transform, mut projection) in &mut cameras {
         let camera = &mut *camera;
@@ -290,6 +292,7 @@ fn follow(
             sight.target(target, anatomy, ragdoll, episode, part);
             sight.lead(track.direction() * camera.ahead);
         }
+        obstacles.add(app.iter());
         sight.game_dt = game.delta_secs();
         *transform = match camera.mode {
             CameraMode::Free => camera.flown(transform.translation, &obstacles, sight.dt),

@@ -1,6 +1,8 @@
-//! Places that a camera must not enter: the ground and the fixed shapes of a ragdoll's model.
+//! Places that a camera must not enter: the ground and the fixed shapes of a ragdoll's model, and the obstacles of the app.
 
 use crate::axes::place_to_game;
+use crate::height_field::HeightField;
+use crate::obstacle::Obstacle;
 use crate::ragdoll::{Anatomy, OwnGround};
 use bevy::math::Affine3A;
 use bevy::prelude::*;
@@ -40,9 +42,9 @@ enum Shape<'a> {
 }
 
 /// A height field with its present elevations, m.
-struct Field<'a> {
-    of: &'a HField,
-    own: Option<&'a [f32]>,
+enum Field<'a> {
+    Model { of: &'a HField, own: Option<&'a [f32]> },
+    App { of: &'a HeightField, scale: Vec3 },
 }
 
 impl<'a> Obstacles<'a> {
@@ -59,7 +61,7 @@ impl<'a> Obstacles<'a> {
             let shape = match geom.hfield.filter(|_| geom.kind == GeomType::Hfield) {
                 Some(number) => {
                     let own = own.and_then(|own| own.0.get(number)).map(Vec::as_slice);
-                    Shape::Field(Field { of: model.hfields.get(number)?, own })
+                    Shape::Field(Field::Model { of: model.hfields.get(number)?, own })
                 }
                 None => Shape::of(geom)?,
             };
@@ -69,6 +71,18 @@ impl<'a> Obstacles<'a> {
             Some(Solid { inverse: place.compute_affine().inverse(), shape, thin })
         };
         Obstacles { solids: fixed.filter_map(solid).collect() }
+    }
+
+    /// Adds obstacles of the app.
+    pub fn add(&mut self, app: impl Iterator<Item = (&'a Obstacle, &'a GlobalTransform)>) {
+        let solids = app.filter_map(|(obstacle, place)| {
+            let (scale, rotation, translation) = place.to_scale_rotation_translation();
+            let shape = Shape::of_app(obstacle, scale.abs())?;
+            let thin = shape.sides().is_some_and(|[a, b, _]| a < THIN && b < THIN);
+            let inverse = Affine3A::from_rotation_translation(rotation, translation).inverse();
+            Some(Solid { inverse, shape, thin })
+        });
+        self.solids.extend(solids);
     }
 
     /// Height of the highest ground (planes and height fields) within a level distance of a place, m. None without ground there.
@@ -119,7 +133,23 @@ fn is_there(geom: &Geom) -> bool {
     geom.rgba[3] > 0.0 || geom.contype != 0 || geom.conaffinity != 0
 }
 
-impl Shape<'_> {
+impl<'a> Shape<'a> {
+    /// The shape of an obstacle of the app at a scale. None for one that nothing feels.
+    fn of_app(obstacle: &'a Obstacle, scale: Vec3) -> Option<Self> {
+        // height fields that are no solids have no points, or none that are near
+        if !matches!(obstacle, Obstacle::HeightField(_)) {
+            obstacle.shape(scale, &mut None)?;
+        }
+        Some(match *obstacle {
+            Obstacle::Sphere { radius } => Shape::Sphere(radius * scale.max_element()),
+            Obstacle::Capsule { radius, half_length } => {
+                Shape::Capsule(radius * scale.x.max(scale.z), half_length * scale.y)
+            }
+            Obstacle::Cuboid { half_size } => Shape::Cuboid(half_size * scale),
+            Obstacle::HeightField(ref of) => Shape::Field(Field::App { of, scale }),
+        })
+    }
+
     /// The shape of a geom other than a height field. None for meshes, which nothing collides with.
     fn of(geom: &Geom) -> Option<Self> {
         let [x, y, z] = geom.size.map(|side| side as f32);
@@ -176,17 +206,31 @@ impl Solid<'_> {
 impl Field<'_> {
     /// Height above the highest point within `around`, or depth below the base, m; infinity beside the field.
     fn clearance(&self, p: Vec3, around: f32) -> f32 {
-        let [half_x, half_y, _, base] = self.of.size.map(|side| side as f32);
-        // the rows of a field go along MuJoCo's y
-        let (rows, columns) = (span(-p.z, half_y, self.of.nrow, around), span(p.x, half_x, self.of.ncol, around));
+        // the rows of a model's field go along MuJoCo's y
+        let (along, half, [columns, rows], base) = match self {
+            Field::Model { of, .. } => {
+                let [x, y, _, base] = of.size.map(|side| side as f32);
+                (-p.z, [x, y], [of.ncol, of.nrow], -base)
+            }
+            Field::App { of, scale } => {
+                let half = 0.5 * of.size() * scale.xz();
+                (p.z, half.to_array(), of.points(), f32::NEG_INFINITY)
+            }
+        };
+        let (rows, columns) = (span(along, half[1], rows, around), span(p.x, half[0], columns, around));
         let (Some(rows), Some(columns)) = (rows, columns) else { return f32::INFINITY };
         let top = rows.flat_map(|row| columns.clone().map(move |column| self.height(row, column)));
         let top = top.fold(f32::NEG_INFINITY, f32::max);
-        (p.y - top).max(-base - p.y)
+        (p.y - top).max(base - p.y)
     }
 
     fn height(&self, row: usize, column: usize) -> f32 {
-        elevation(self.of, self.own, row, column)
+        match *self {
+            Field::Model { of, own } => elevation(of, own, row, column),
+            Field::App { of, scale } => {
+                scale.y * of.heights().get(row * of.points()[0] + column).copied().unwrap_or_default()
+            }
+        }
     }
 }
 
@@ -236,6 +280,22 @@ mod tests {
         assert!((1.7..1.9).contains(&cast(-2.0 * Vec3::X)), "{}", cast(-2.0 * Vec3::X));
         assert_eq!(all.ground(from, 0.2), Some(0.0));
         Ok(())
+    }
+
+    #[test]
+    fn obstacles_of_the_app_are_avoided() {
+        let hill = HeightField::from_fn(Vec2::splat(4.0), [5, 5], |x, _| if x < 0.0 { 0.0 } else { 1.0 });
+        let app = [
+            (Obstacle::Cuboid { half_size: Vec3::new(0.5, 1.0, 1.0) }, GlobalTransform::from_xyz(-3.0, 1.0, 0.0)),
+            (Obstacle::HeightField(hill), GlobalTransform::from(Transform::from_scale(Vec3::new(1.0, 2.0, 1.0)))),
+            (Obstacle::Sphere { radius: f32::NAN }, GlobalTransform::from_xyz(0.0, 1.0, 0.0)),
+        ];
+        let mut all = Obstacles::default();
+        all.add(app.iter().map(|(obstacle, place)| (obstacle, place)));
+        let from = Vec3::new(-1.5, 1.0, 0.0);
+        assert!((all.cast(from, from - 2.0 * Vec3::X, 0.2) - 0.8).abs() < 0.03);
+        assert!(all.cast(from, from + 3.0 * Vec3::X, 0.2) < 1.0);
+        assert_eq!([1.0, -1.9].map(|x| all.ground(Vec3::new(x, 3.0, 1.0), 0.05)), [Some(2.0), Some(0.0)]);
     }
 
     #[test]

@@ -4,13 +4,15 @@ use super::candidate::{Candidate, add_all, gather};
 use super::convex::form;
 use super::slots::{Carrier, Slots};
 use crate::algebra::spatial::*;
-use crate::geometry::convex::{Form, Number, Scratch, Search, Solid, convex};
+use crate::geometry::convex::{Form, Number, Scratch, Search, Solid, convex, field_convex};
+use crate::geometry::field_capsule::field_capsule;
+use crate::geometry::height::{HeightField, Terrain, field_box};
 use crate::geometry::{Capsule, Cuboid, Cylinder, Sphere, Touches, first_tangent, pick, pick_axes};
 use crate::geometry::{box_box, capsule_box, round};
-use crate::lanes::kernel_fn;
+use crate::lanes::{MAX_LANES, Real, kernel_fn};
 use crate::model::GeomType;
-use crate::sim::{ShapePair, Sim, rank};
-use crate::state::{Group, Work};
+use crate::sim::{GeomPairOf, ShapePair, Sim, rank};
+use crate::state::{GeomContacts, Group, Work};
 
 kernel_fn! {
     /// Finds and writes the contacts of a geom with its agent's obstacles, one obstacle after the other.
@@ -45,10 +47,17 @@ kernel_fn! {
                     form: form(kind, &pair.sizes[1], hull),
                 };
                 let contacts = &mut work.contacts;
-                let (scratch, touches) = (&mut contacts.convex, &mut contacts.lane_touches);
-                touches.clear();
-                touch(&first, own.kind, &second, kind, pair.margin, &sim.search, scratch, touches);
-                gather(touches, lane, &mut found);
+                contacts.lane_touches.clear();
+                match &own.field {
+                    Some(field) => {
+                        touch_field(&field.grid, (&at, &own.axes), &second, kind, pair, &sim.search, contacts);
+                    }
+                    None => {
+                        let (scratch, touches) = (&mut contacts.convex, &mut contacts.lane_touches);
+                        touch(&first, own.kind, &second, kind, pair.margin, &sim.search, scratch, touches);
+                    }
+                }
+                gather(&contacts.lane_touches, lane, &mut found);
             }
             slots.carrier = Some(Carrier { center: sub3(&ball.center, &base), velocity: ball.velocity, spin: ball.spin });
             add_all(sim, group, work, slots, candidate.place, &found);
@@ -97,6 +106,34 @@ fn touch<S: Number>(
             touch.normal = neg3(&touch.normal);
             touch.tangent = neg3(&touch.tangent);
         });
+    }
+}
+
+/// Appends the contacts of a height field with a geom to those of the lane.
+#[inline(always)]
+fn touch_field<T: Real>(
+    field: &HeightField<T::Scalar>,
+    (center, axes): (&V3<T::Scalar>, &Rot<T::Scalar>),
+    geom: &Solid<T::Scalar>,
+    kind: GeomType,
+    pair: &GeomPairOf<T::Scalar>,
+    search: &Search<T::Scalar>,
+    contacts: &mut GeomContacts<T>,
+) {
+    let out = &mut contacts.lane_touches;
+    let terrain = Terrain { fields: [field; MAX_LANES], center: *center, axes: *axes };
+    match kind {
+        GeomType::Sphere | GeomType::Capsule => {
+            let (gaps, found) = (&mut contacts.lane_gaps, &mut contacts.lane_found);
+            found.clear();
+            field_capsule(&terrain, &capsule(geom), pair.margin, T::Scalar::from_bits(1), gaps, found);
+            found.iter().for_each(|touch| out.push(*touch));
+        }
+        GeomType::Box => field_box(&terrain, &cuboid(geom), pair.margin, out),
+        _ => {
+            field_convex((field, center, axes), geom, pair.margin, search, &mut contacts.convex, out);
+            out.each(|touch| touch.tangent = first_tangent(&touch.normal));
+        }
     }
 }
 

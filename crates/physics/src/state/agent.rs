@@ -1,7 +1,7 @@
 //! The complete state of one agent, independent of lanes.
 
 use super::group::Group;
-use super::obstacle::Obstacle;
+use super::obstacle::{Obstacle, take};
 use super::variation::Variation;
 use crate::geometry::height::HeightField;
 use crate::lanes::Real;
@@ -66,7 +66,7 @@ impl AgentState {
         }
         if !obstacles.is_empty() {
             bytes.extend((obstacles.len() as u32).to_le_bytes());
-            bytes.extend(obstacles.iter().flat_map(Obstacle::numbers).flat_map(f64::to_le_bytes));
+            obstacles.iter().for_each(|obstacle| obstacle.write_to(bytes));
         }
     }
 
@@ -105,8 +105,7 @@ impl AgentState {
             if count > Obstacle::MOST || model.obstacles.is_none() {
                 return None;
             }
-            let numbers = take(&mut bytes, 17 * count, f64::from_le_bytes)?;
-            obstacles = numbers.as_chunks().0.iter().map(Obstacle::of_numbers).collect::<Option<_>>()?;
+            obstacles = (0..count).map(|_| Obstacle::read_from(&mut bytes)).collect::<Option<_>>()?;
         }
         Some((AgentState { numbers, pushes, variation, grounds, obstacles }, bytes))
     }
@@ -117,13 +116,6 @@ const PUSHED: u8 = 1;
 const VARIED: u8 = 2;
 const GROUNDED: u8 = 4;
 const OBSTRUCTED: u8 = 8;
-
-/// Takes `count` numbers from the front of some bytes.
-fn take<const N: usize, X>(bytes: &mut &[u8], count: usize, number: fn([u8; N]) -> X) -> Option<Vec<X>> {
-    let (mine, rest) = bytes.split_at_checked(count.checked_mul(N)?)?;
-    *bytes = rest;
-    Some(mine.as_chunks::<N>().0.iter().map(|x| number(*x)).collect())
-}
 
 impl PartialEq for AgentState {
     /// Bitwise equality.

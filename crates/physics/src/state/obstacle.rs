@@ -1,12 +1,13 @@
-//! An obstacle of an agent: a sphere, capsule or box that it touches and cannot move.
+//! An obstacle of an agent: a sphere, capsule, box or height field that it touches and cannot move.
 //!
-//! Obstacles come from outside the physics, such as the walls, platforms and other characters of a game.
+//! Obstacles come from outside the physics, such as the walls, platforms, terrain and other characters of a game.
 
-use crate::model::{Quat, Vec3};
+use crate::model::{HField, Quat, Vec3};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Shape of an [`Obstacle`], sizes in m.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum ObstacleShape {
     /// A ball.
     Sphere {
@@ -25,12 +26,29 @@ pub enum ObstacleShape {
         /// Half its extent along each axis.
         half_size: Vec3,
     },
+    /// A height field. Its elevations are finite, and can be of any sign above the base.
+    HField(#[serde(with = "shared")] Arc<HField>),
+}
+
+/// Reads and writes what an `Arc` points to.
+mod shared {
+    use super::HField;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+    use std::sync::Arc;
+
+    pub fn serialize<S: Serializer>(field: &HField, serializer: S) -> Result<S::Ok, S::Error> {
+        field.serialize(serializer)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Arc<HField>, D::Error> {
+        HField::deserialize(deserializer).map(Arc::new)
+    }
 }
 
 /// A solid that an agent touches and cannot move, in world axes.
 ///
 /// The model must have a geom for them, see [`ModelSpec::add_obstacles`](crate::spec::ModelSpec::add_obstacles).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Obstacle {
     /// Shape.
     pub shape: ObstacleShape,
@@ -55,14 +73,20 @@ impl Obstacle {
 
     /// The first number that is out of its range: its name, its value and the valid values.
     pub fn out_of_range(&self) -> Option<(&'static str, f64, &'static str)> {
-        let valid = |x: &f64| x.is_finite() && *x > 0.0;
-        let (sizes, round) = match self.shape {
-            ObstacleShape::Sphere { radius } => ([radius, 1.0, 1.0], true),
-            ObstacleShape::Capsule { radius, half_length } => ([radius, half_length, 1.0], true),
-            ObstacleShape::Box { half_size } => (half_size, false),
+        let positive = |name, sizes: &[f64]| {
+            let wrong = sizes.iter().copied().find(|x| !(x.is_finite() && *x > 0.0));
+            wrong.map(|x| (name, x, "a length above 0"))
         };
-        if let Some(x) = sizes.into_iter().find(|x| !valid(x)) {
-            return Some((if round { "radius or half length" } else { "half size" }, x, "a length above 0"));
+        let wrong = match &self.shape {
+            ObstacleShape::Sphere { radius } => positive("radius", &[*radius]),
+            ObstacleShape::Capsule { radius, half_length } => {
+                positive("radius or half length", &[*radius, *half_length])
+            }
+            ObstacleShape::Box { half_size } => positive("half size", half_size),
+            ObstacleShape::HField(field) => out_of_field(field).or_else(|| positive("size of its field", &field.size)),
+        };
+        if wrong.is_some() {
+            return wrong;
         }
         let first = |numbers: &[f64]| numbers.iter().copied().find(|x| !x.is_finite());
         let norm = self.quat.iter().map(|x| x * x).sum::<f64>();
@@ -75,32 +99,61 @@ impl Obstacle {
             .or_else(turn)
     }
 
-    /// All numbers, after one for the kind of the shape.
-    pub(super) fn numbers(&self) -> [f64; 17] {
-        let (kind, size) = match self.shape {
-            ObstacleShape::Sphere { radius } => (0.0, [radius, 0.0, 0.0]),
-            ObstacleShape::Capsule { radius, half_length } => (1.0, [radius, half_length, 0.0]),
-            ObstacleShape::Box { half_size } => (2.0, half_size),
+    /// Appends its bytes. [`read_from`](Obstacle::read_from) is the inverse.
+    pub(super) fn write_to(&self, bytes: &mut Vec<u8>) {
+        let (kind, size) = match &self.shape {
+            ObstacleShape::Sphere { radius } => (0.0, [*radius, 0.0, 0.0, 0.0]),
+            ObstacleShape::Capsule { radius, half_length } => (1.0, [*radius, *half_length, 0.0, 0.0]),
+            ObstacleShape::Box { half_size: [x, y, z] } => (2.0, [*x, *y, *z, 0.0]),
+            ObstacleShape::HField(field) => (3.0, field.size),
         };
-        let mut out = [kind; 17];
-        let parts = [&size[..], &self.pos, &self.quat, &self.velocity, &self.angular_velocity];
-        for (x, y) in out[1..].iter_mut().zip(parts.into_iter().flatten()) {
-            *x = *y;
+        let parts = [&[kind][..], &size, &self.pos, &self.quat, &self.velocity, &self.angular_velocity];
+        bytes.extend(parts.into_iter().flatten().flat_map(|x| x.to_le_bytes()));
+        if let ObstacleShape::HField(field) = &self.shape {
+            bytes.extend([field.nrow, field.ncol].into_iter().flat_map(|x| (x as u64).to_le_bytes()));
+            bytes.extend(field.data.iter().flat_map(|x| x.to_le_bytes()));
         }
-        out
     }
 
-    /// The obstacle of such numbers, if they are valid.
-    pub(super) fn of_numbers(x: &[f64; 17]) -> Option<Self> {
+    /// Reads an obstacle from the front of some bytes. `None` if they are invalid.
+    pub(super) fn read_from(bytes: &mut &[u8]) -> Option<Self> {
+        let x = take(bytes, 18, f64::from_le_bytes)?;
         let v3 = |at: usize| [x[at], x[at + 1], x[at + 2]];
         let shape = match x[0] {
             0.0 => ObstacleShape::Sphere { radius: x[1] },
             1.0 => ObstacleShape::Capsule { radius: x[1], half_length: x[2] },
             2.0 => ObstacleShape::Box { half_size: v3(1) },
+            3.0 => {
+                let sides = take(bytes, 2, u64::from_le_bytes)?;
+                let [nrow, ncol] = [sides[0], sides[1]].map(|side| usize::try_from(side).unwrap_or(usize::MAX));
+                let data = take(bytes, nrow.checked_mul(ncol)?, f32::from_le_bytes)?;
+                let size = [x[1], x[2], x[3], x[4]];
+                ObstacleShape::HField(Arc::new(HField { name: String::new(), nrow, ncol, size, data }))
+            }
             _ => return None,
         };
-        let quat = [x[7], x[8], x[9], x[10]];
-        let out = Obstacle { shape, pos: v3(4), quat, velocity: v3(11), angular_velocity: v3(14) };
+        let quat = [x[8], x[9], x[10], x[11]];
+        let out = Obstacle { shape, pos: v3(5), quat, velocity: v3(12), angular_velocity: v3(15) };
         out.out_of_range().is_none().then_some(out)
     }
+}
+
+/// What is wrong with the grid of a height field, as [`Obstacle::out_of_range`] says it.
+fn out_of_field(field: &HField) -> Option<(&'static str, f64, &'static str)> {
+    if let Some(side) = [field.nrow, field.ncol].into_iter().find(|side| *side < 2) {
+        return Some(("side of its field", side as f64, "at least 2 points"));
+    }
+    if field.nrow.checked_mul(field.ncol) != Some(field.data.len()) {
+        return Some(("field of this many elevations", field.data.len() as f64, "one per row and column"));
+    }
+    let below = -field.size[3] / field.size[2];
+    let wrong = field.data.iter().map(|x| f64::from(*x)).find(|x| !(x.is_finite() && *x > below));
+    wrong.map(|x| ("elevation", x, "a finite number above the base"))
+}
+
+/// Takes `count` numbers from the front of some bytes.
+pub(super) fn take<const N: usize, X>(bytes: &mut &[u8], count: usize, number: fn([u8; N]) -> X) -> Option<Vec<X>> {
+    let (mine, rest) = bytes.split_at_checked(count.checked_mul(N)?)?;
+    *bytes = rest;
+    Some(mine.as_chunks::<N>().0.iter().map(|x| number(*x)).collect())
 }

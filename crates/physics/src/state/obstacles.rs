@@ -20,7 +20,7 @@ impl<T: Real> Group<T> {
                 panic!("an obstacle has a {name} of {found}, expected {expected}");
             }
             let norm = o.quat.iter().map(|x| x * x).sum::<f64>().sqrt();
-            Obstacle { quat: o.quat.map(|x| x / norm), ..*o }
+            Obstacle { quat: o.quat.map(|x| x / norm), ..o.clone() }
         };
         let obstacles: Vec<Obstacle> = obstacles.iter().map(unit).collect();
         self.put_obstacles(lane, &obstacles);

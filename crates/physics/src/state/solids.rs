@@ -3,15 +3,18 @@
 use super::obstacle::{Obstacle, ObstacleShape};
 use crate::algebra::spatial::*;
 use crate::geometry::bounding_radius;
+use crate::geometry::height::HeightField;
 use crate::lanes::Real;
-use crate::model::GeomType;
+use crate::model::{GeomType, HField};
+use std::sync::Arc;
 
 /// An obstacle in the precision of the lanes.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Solid<S> {
+#[derive(Clone, Debug)]
+pub(crate) struct Solid<S: Real> {
     pub kind: GeomType,
-    /// In MJCF's order.
+    /// In MJCF's order; height fields have none.
     pub size: V3<S>,
+    pub field: Option<Field<S>>,
     pub pos: V3<S>,
     pub quat: [S; 4],
     pub axes: Rot<S>,
@@ -19,29 +22,53 @@ pub(crate) struct Solid<S> {
     pub spin: V3<S>,
 }
 
+/// A height field as it was given, and as the lanes use it.
+#[derive(Clone, Debug)]
+pub(crate) struct Field<S: Real> {
+    given: Arc<HField>,
+    pub grid: Arc<HeightField<S>>,
+}
+
 impl<S: Real<Scalar = S>> Solid<S> {
-    fn of<T: Real<Scalar = S>>(obstacle: &Obstacle) -> Self {
+    /// An obstacle, whose height field may be among those that are already `known`.
+    fn of<T: Real<Scalar = S>>(obstacle: &Obstacle, known: &[Field<S>]) -> Self {
         let v3 = |v: [f64; 3]| v.map(T::scalar);
-        let (kind, size) = match obstacle.shape {
-            ObstacleShape::Sphere { radius } => (GeomType::Sphere, [radius, 0.0, 0.0]),
-            ObstacleShape::Capsule { radius, half_length } => (GeomType::Capsule, [radius, half_length, 0.0]),
-            ObstacleShape::Box { half_size } => (GeomType::Box, half_size),
+        let mut field = None;
+        let (kind, size) = match &obstacle.shape {
+            ObstacleShape::Sphere { radius } => (GeomType::Sphere, [*radius, 0.0, 0.0]),
+            ObstacleShape::Capsule { radius, half_length } => (GeomType::Capsule, [*radius, *half_length, 0.0]),
+            ObstacleShape::Box { half_size } => (GeomType::Box, *half_size),
+            ObstacleShape::HField(given) => {
+                let same = known.iter().find(|known| Arc::ptr_eq(&known.given, given)).cloned();
+                let new = || Field { given: given.clone(), grid: Arc::new(HeightField::new(given)) };
+                field = Some(same.unwrap_or_else(new));
+                (GeomType::Hfield, [0.0; 3])
+            }
         };
         let quat = obstacle.quat.map(T::scalar);
         let (velocity, spin) = (v3(obstacle.velocity), v3(obstacle.angular_velocity));
-        Solid { kind, size: v3(size), pos: v3(obstacle.pos), quat, axes: quat_to_rot(&quat), velocity, spin }
+        Solid { kind, size: v3(size), field, pos: v3(obstacle.pos), quat, axes: quat_to_rot(&quat), velocity, spin }
     }
 
     fn widened<T: Real<Scalar = S>>(&self) -> Obstacle {
         let v3 = |v: &V3<S>| v.map(T::widen);
         let size = v3(&self.size);
-        let shape = match self.kind {
-            GeomType::Sphere => ObstacleShape::Sphere { radius: size[0] },
-            GeomType::Capsule => ObstacleShape::Capsule { radius: size[0], half_length: size[1] },
+        let shape = match (self.kind, &self.field) {
+            (_, Some(field)) => ObstacleShape::HField(field.given.clone()),
+            (GeomType::Sphere, None) => ObstacleShape::Sphere { radius: size[0] },
+            (GeomType::Capsule, None) => ObstacleShape::Capsule { radius: size[0], half_length: size[1] },
             _ => ObstacleShape::Box { half_size: size },
         };
         let (velocity, angular_velocity) = (v3(&self.velocity), v3(&self.spin));
         Obstacle { shape, pos: v3(&self.pos), quat: self.quat.map(T::widen), velocity, angular_velocity }
+    }
+
+    /// Radius of a ball around it.
+    fn radius<T: Real<Scalar = S>>(&self) -> f64 {
+        let Some(field) = &self.field else { return bounding_radius(self.kind, &self.size.map(T::widen)) };
+        let [x, y, _, base] = field.given.size;
+        let height = T::widen(field.grid.top).max(base);
+        (x * x + y * y + height * height).sqrt()
     }
 }
 
@@ -81,9 +108,14 @@ impl<T: Real> Solids<T> {
 
     /// Sets the obstacles of a lane. Their quaternions stay as they are.
     pub fn set(&mut self, lane: usize, obstacles: &[Obstacle]) {
+        // the same field is usually set again at every decision, for every agent
+        let mut known: Vec<Field<T::Scalar>> = Vec::new();
+        if obstacles.iter().any(|o| matches!(o.shape, ObstacleShape::HField(_))) {
+            known.extend(self.own.iter().flatten().filter_map(|solid| solid.field.clone()));
+        }
         let own = &mut self.own[lane];
         own.clear();
-        own.extend(obstacles.iter().map(Solid::of::<T>));
+        own.extend(obstacles.iter().map(|obstacle| Solid::of::<T>(obstacle, &known)));
         let moves = |solid: &Solid<T::Scalar>| solid.velocity.iter().chain(&solid.spin).any(|x| T::widen(*x) != 0.0);
         self.moving[lane] = own.iter().any(moves);
         self.surround(lane);
@@ -136,7 +168,7 @@ impl<T: Real> Solids<T> {
         let (nowhere, zero) = (T::scalar(NOWHERE), T::scalar(0.0));
         for (number, ball) in self.balls.iter_mut().enumerate() {
             let solid = self.own[lane].get(number);
-            let radius = solid.map(|solid| bounding_radius(solid.kind, &solid.size.map(T::widen)));
+            let radius = solid.map(Solid::radius::<T>);
             ball.radius.set(lane, radius.map_or(zero, T::scalar));
             for i in 0..3 {
                 ball.center[i].set(lane, solid.map_or(nowhere, |solid| solid.pos[i]));

@@ -29,6 +29,9 @@ pub(crate) struct GeomContacts<T: Real> {
     /// Contacts of one pair of geoms, and of one lane of them.
     pub touches: Vec<Touch<T>>,
     pub lane_touches: Touches<T::Scalar>,
+    /// Contacts and gaps between the height field of an obstacle and a geom of one lane.
+    pub lane_found: Vec<Touch<T::Scalar>>,
+    pub lane_gaps: Gaps<T::Scalar>,
     /// Memory of the searches between convex shapes.
     pub convex: convex::Scratch<T::Scalar>,
     /// Gaps between one pair of a height field and another geom.
@@ -53,6 +56,8 @@ impl<T: Real> GeomContacts<T> {
             sweep: Sweep::new(if sim.contacts.broad.is_some() { sim.geoms.len() } else { 0 }),
             touches: Vec::new(),
             lane_touches: Touches::new(),
+            lane_found: Vec::new(),
+            lane_gaps: Gaps::new(),
             convex: convex::Scratch::new(),
             gaps: Gaps::new(),
         }
