@@ -51,7 +51,9 @@ pub fn id() -> Id {
 pub fn show(ctx: &egui::Context, title: &str, width: f32, draw: impl FnOnce(&mut Ui)) {
     let room = (ctx.content_rect().size() - MARGIN).max(Vec2::splat(80.0));
     let window = egui::Window::new(RichText::new(title).size(20.0).strong());
+    // egui keeps the largest height of the first frame, when the text may not have its size yet
     let window = window.id(id()).anchor(Align2::CENTER_CENTER, [0.0, 0.0]).collapsible(false).auto_sized();
+    let window = window.min_height(room.y - 24.0);
     window.show(ctx, |ui| {
         ui.set_width(width.min(room.x));
         // each screen scrolls by itself
