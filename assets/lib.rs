@@ -37,6 +37,8 @@ pub const FILES: &[(&str, &[u8])] = files![
     "gymnasium/humanoidstandup.xml",
     "gymnasium/inverted_double_pendulum.xml",
     "gymnasium/inverted_pendulum.xml",
+    "gymnasium/pusher.xml",
+    "gymnasium/reacher.xml",
     "gymnasium/swimmer.xml",
     "gymnasium/walker2d.xml",
     "motions/humanoid/run.motion",

@@ -15,15 +15,16 @@ const TYPES = {
 };
 export const FOLDER = "/some/folder/";
 
-/** Starts a server. `extra` are more files by path. `requests` collects the paths that were asked for. */
-export async function serve(extra = {}) {
+/** Starts a server. `extra` are more files by path, `folders` more folders. `requests` collects the paths that were asked for. */
+export async function serve(extra = {}, folders = {}) {
   const requests = [];
   const server = createServer(async (request, response) => {
     const path = decodeURIComponent(new URL(request.url, "http://localhost").pathname);
     requests.push(path);
     const inside = path.startsWith(FOLDER) ? normalize(path.slice(FOLDER.length)) || "index.html" : null;
     try {
-      const given = extra[path];
+      const start = Object.keys(folders).find((start) => path.startsWith(start) && !normalize(path).includes(".."));
+      const given = start === undefined ? extra[path] : await readFile(join(folders[start], normalize(path.slice(start.length))));
       if (given === undefined && (inside === null || inside.startsWith(".."))) throw new Error("outside");
       const name = inside === "." ? "index.html" : inside;
       const bytes = given ?? (await readFile(join(DIST, name)));

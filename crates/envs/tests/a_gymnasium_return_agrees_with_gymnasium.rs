@@ -84,7 +84,7 @@ fn to_json(value: &Value) -> Json {
     }
 }
 
-const TASKS: [&str; 9] = [
+const TASKS: [&str; 11] = [
     "Hopper-v5",
     "Walker2d-v5",
     "HalfCheetah-v5",
@@ -94,6 +94,8 @@ const TASKS: [&str; 9] = [
     "Swimmer-v5",
     "InvertedPendulum-v5",
     "InvertedDoublePendulum-v5",
+    "Reacher-v5",
+    "Pusher-v5",
 ];
 
 fn cases() -> Vec<Case> {
@@ -160,6 +162,17 @@ fn cases() -> Vec<Case> {
         Case::new("InvertedPendulum-v5").with("frame_skip", 3.0).with("reset_noise_scale", 0.15),
         // fast enough to hit the end of the rail
         Case::new("InvertedDoublePendulum-v5").with("healthy_reward", 3.0).with("reset_noise_scale", 0.5),
+        Case::new("Reacher-v5")
+            .with("reward_dist_weight", 2.0)
+            .with("reward_control_weight", 0.1)
+            .with("frame_skip", 3.0),
+        Case::new("Reacher-v5").with("xml_file", &*installed("reacher.xml")),
+        Case::new("Pusher-v5")
+            .with("reward_near_weight", 2.0)
+            .with("reward_dist_weight", 0.5)
+            .with("reward_control_weight", 0.3)
+            .with("frame_skip", 4.0),
+        Case::new("Pusher-v5").with("xml_file", &*installed("pusher_v5.xml")),
     ]);
     cases
 }

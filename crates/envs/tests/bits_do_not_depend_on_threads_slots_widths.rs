@@ -130,6 +130,16 @@ fn gymnasiums_double_pendulum() {
     check("InvertedDoublePendulum-v5");
 }
 
+#[test]
+fn gymnasiums_reacher() {
+    check("Reacher-v5");
+}
+
+#[test]
+fn gymnasiums_pusher() {
+    check("Pusher-v5");
+}
+
 /// dm_control's tasks: touch sensors, starts that are drawn repeatedly, and starts that settle.
 #[test]
 fn dm_controls_hopper() {

@@ -15,6 +15,8 @@ pub mod humanoid;
 pub mod humanoid_standup;
 pub mod inverted_double_pendulum;
 pub mod inverted_pendulum;
+pub mod pusher;
+pub mod reacher;
 pub mod swimmer;
 pub mod walker2d;
 
@@ -24,7 +26,7 @@ use marathon_physics::Model;
 use marathon_physics::lanes::Real;
 
 use crate::agent::senses::clamp;
-use crate::agent::{Controls, Facts, ModelSource, Obs, Senses, Start, View};
+use crate::agent::{Body, Controls, Facts, ModelSource, Obs, Senses, Start, View};
 use crate::any_agent::AnyAgent;
 
 /// All tasks, in the order of listings.
@@ -39,11 +41,13 @@ pub fn all() -> Vec<Arc<dyn AnyAgent>> {
         Arc::new(swimmer::Swimmer::default()),
         Arc::new(inverted_pendulum::InvertedPendulum::default()),
         Arc::new(inverted_double_pendulum::InvertedDoublePendulum::default()),
+        Arc::new(reacher::Reacher::default()),
+        Arc::new(pusher::Pusher::default()),
     ]
 }
 
 /// The models that ship with Gymnasium, by their names in `xml_file`.
-const MODELS: [(&str, &str); 9] = [
+const MODELS: [(&str, &str); 11] = [
     ("hopper.xml", marathon_assets::text("gymnasium/hopper.xml")),
     ("walker2d_v5.xml", marathon_assets::text("gymnasium/walker2d.xml")),
     ("half_cheetah.xml", marathon_assets::text("gymnasium/half_cheetah.xml")),
@@ -53,6 +57,8 @@ const MODELS: [(&str, &str); 9] = [
     ("swimmer.xml", marathon_assets::text("gymnasium/swimmer.xml")),
     ("inverted_pendulum.xml", marathon_assets::text("gymnasium/inverted_pendulum.xml")),
     ("inverted_double_pendulum.xml", marathon_assets::text("gymnasium/inverted_double_pendulum.xml")),
+    ("reacher.xml", marathon_assets::text("gymnasium/reacher.xml")),
+    ("pusher_v5.xml", marathon_assets::text("gymnasium/pusher.xml")),
 ];
 
 /// Facts that the tasks share.
@@ -145,6 +151,19 @@ fn from_origin<T: Real>(s: &Senses<T>, i: usize) -> T {
 #[inline(always)]
 fn distance<T: Real>([x, y]: [T; 2]) -> T {
     x.mul_add(x, y * y).sqrt()
+}
+
+/// The way from one body's frame to another one's, m.
+#[inline(always)]
+fn way<T: Real>(s: &Senses<T>, from: Body, to: Body) -> [T; 3] {
+    let [from, to] = [from, to].map(|body| s.readings().body_pos(s.body(body)));
+    [to[0] - from[0], to[1] - from[1], to[2] - from[2]]
+}
+
+/// Length of a vector.
+#[inline(always)]
+fn length<T: Real>([x, y, z]: [T; 3]) -> T {
+    x.mul_add(x, y.mul_add(y, z * z)).sqrt()
 }
 
 /// Mean velocity of a point between two decisions, stored in an agent's memory.
