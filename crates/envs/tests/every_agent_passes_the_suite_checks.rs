@@ -38,13 +38,15 @@ fn touch_sensors_are_those_of_the_model() {
 }
 
 /// Agents whose episodes random actions rarely or never end. One of them has eight seconds to get up after a fall.
-const STEADY: [&str; 8] = [
+const STEADY: [&str; 10] = [
     "Ant-v0",
     "Ant-v1",
     "AntController-v0",
     "TerrainAnt-v0",
     "MarathonManController-v0",
     "HalfCheetah-v5",
+    "Reacher-v5",
+    "Pusher-v5",
     "HumanoidStandup-v5",
     "Swimmer-v5",
 ];
