@@ -66,6 +66,20 @@ const CASES: &[Case] = &[
         )
     },
     Case {
+        // of all angles that are the same orientation, the one nearest to the target counts, for servos of nothing but turns
+        ctrl: &[-1.5, 2.5, 9.0, -4.0],
+        ..case(
+            "targets more than half a turn away",
+            arms!(
+                r#"</worldbody><actuator><position site="l" refsite="elbow" kp="0.5" kv="0.02" gear="0 0 0 0.1 0.2 0"/>
+                <position name="b" site="tip" refsite="post" kp="0.3" timeconst="0.1" gear="0 0 0 0 1 0"/>
+                <position site="tip" refsite="post" kp="0.1" gear="0.01 0 0 0 1 0"/>
+                <general site="tip" refsite="elbow" biastype="affine" gainprm="0.2" biasprm="0.1 -0.1 -0.01" gear="0 0 0 0 0 1"/></actuator>
+                <sensor><actuatorpos actuator="b"/><actuatorfrc actuator="b"/></sensor>"#
+            ),
+        )
+    },
+    Case {
         qvel: &[3.0, 2.0, -3.0, 4.0, 2.0, -3.0],
         ctrl: &[0.3, -0.5, 0.2],
         ..case(

@@ -24,6 +24,12 @@ const ROWS: usize = 6;
 /// Lane counts whose kernels have 32 registers, and room for four columns: AVX-512, and NEON. One lane is a row of blocks.
 const FOUR_COLUMNS: &[usize] = if cfg!(target_arch = "aarch64") { &[1, 4, 16] } else { &[1, 16] };
 
+/// Most rows of a tile with two columns or four. Engines of WebAssembly keep fewer numbers in registers than LLVM.
+#[inline(always)]
+fn rows<T: Real>() -> usize {
+    if T::LANES == 4 && !FOUR_COLUMNS.contains(&4) { 4 } else { ROWS }
+}
+
 /// Splits `n` into tiles of at most `max` that are as equal as possible. Returns the size of the next one.
 #[inline(always)]
 fn next_tile(n: usize, max: usize) -> usize {
@@ -101,7 +107,7 @@ fn affine_columns<T: Real, const V: usize>(
 ) {
     let at = columns::<T, V>(first);
     let x = column_rows(x, x_stride, ni, &at);
-    tiles!(no, ROWS, j, affine_tile, [V], (&w[j * ni..], &b[j..], &x, y, y_stride, j, &at));
+    tiles!(no, rows::<T>(), j, affine_tile, [V], (&w[j * ni..], &b[j..], &x, y, y_stride, j, &at));
 }
 
 #[inline(always)]
@@ -155,7 +161,7 @@ fn transposed_columns<T: Real, const V: usize>(
 ) {
     let at = columns::<T, V>(first);
     let dy = column_rows(dy, dy_stride, no, &at);
-    tiles!(ni, ROWS, k, transposed_tile, [V], (w, ni, &dy, dx, dx_stride, k, &at));
+    tiles!(ni, rows::<T>(), k, transposed_tile, [V], (w, ni, &dy, dx, dx_stride, k, &at));
 }
 
 #[inline(always)]
@@ -328,10 +334,11 @@ fn outer_part<T: Real, const K: usize, const J: usize>(
     blocks: usize,
     lane: usize,
 ) -> [[T; K]; J] {
+    // known to the compiler, which then checks no bounds below
+    let lane = lane.min(BLOCK - T::LANES);
     let mut acc = [[T::zero(); K]; J];
-    for b in 0..blocks {
-        let xr = &x[b * x_stride + k..][..K];
-        let dr = &dy[b * dy_stride + j..][..J];
+    for (xb, db) in x.chunks_exact(x_stride).zip(dy.chunks_exact(dy_stride)).take(blocks) {
+        let (xr, dr) = (&xb[k..k + K], &db[j..j + J]);
         let mut xv = [T::zero(); K];
         for i in 0..K {
             xv[i] = load(&xr[i], lane);

@@ -54,7 +54,7 @@ fn force_and_slope<T: Real>(
     let mut force = input * T::splat(actuator.gain[0]);
     let mut slope = T::zero();
     if !actuator.plain {
-        let (length, velocity) = match &actuator.transmission {
+        let (mut length, velocity) = match &actuator.transmission {
             TransmissionSpec::Joint { dofs, qpos, gear } => {
                 let gear = T::splat(gear[0]);
                 (gear * group.qpos[*qpos], gear * group.qvel[dofs.start])
@@ -67,6 +67,10 @@ fn force_and_slope<T: Real>(
             // nothing is fed back, but the bias may be constant
             TransmissionSpec::Adhesion => (T::zero(), T::zero()),
         };
+        if let Some([turn, inverse]) = actuator.turn {
+            let turns = ((input - length) * T::splat(inverse)).round();
+            length = turns.mul_add(T::splat(turn), length);
+        }
         let (g, b) = (&actuator.gain, &actuator.bias);
         let gain = T::splat(g[2]).mul_add(velocity, T::splat(g[1]).mul_add(length, T::splat(g[0])));
         let bias = T::splat(b[2]).mul_add(velocity, T::splat(b[1]).mul_add(length, T::splat(b[0])));

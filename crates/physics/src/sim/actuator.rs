@@ -28,6 +28,9 @@ pub(crate) struct ActuatorSpec<C> {
     /// In place of gain and bias. Few actuators are muscles, so they do not lengthen the list.
     pub gain_muscle: Option<Box<MuscleSpec<C>>>,
     pub bias_muscle: Option<Box<MuscleSpec<C>>>,
+    /// A full turn in units of the length, and its inverse, for a position servo that turns a site: of all equivalent
+    /// angles, the nearest to the target counts.
+    pub turn: Option<[C; 2]>,
     /// Whether it is a plain motor: force = gain * input.
     pub plain: bool,
     pub activation: Option<Activation<C>>,
@@ -90,6 +93,7 @@ pub(super) fn actuators<T: Real>(model: &Model) -> Vec<ActuatorSpec<T::Scalar>> 
             bias: a.bias.map(c),
             gain_muscle: a.gain_muscle.as_ref().map(|m| Box::new(MuscleSpec::new::<T>(m))),
             bias_muscle: a.bias_muscle.as_ref().map(|m| Box::new(MuscleSpec::new::<T>(m))),
+            turn: full_turn(a).map(|turn| [c(turn), c(1.0 / turn)]),
             plain: !a.is_fed_back() && a.bias == [0.0; 3],
             activation: a.act.map(|index| Activation {
                 index,
@@ -107,6 +111,15 @@ pub(super) fn actuators<T: Real>(model: &Model) -> Vec<ActuatorSpec<T::Scalar>> 
         }
     };
     if flags.actuation { model.actuators.iter().map(&mut spec).collect() } else { Vec::new() }
+}
+
+/// A full turn in units of the length of a servo for the orientation of one site relative to another one.
+fn full_turn(a: &Actuator) -> Option<f64> {
+    let between = matches!(a.transmission, Transmission::Site { reference: Some(_), .. });
+    let ([x, y, z, rx, ry, rz], servo) =
+        (a.gear, a.gain[1..] == [0.0; 2] && a.gain[0] != 0.0 && a.bias[1] == -a.gain[0]);
+    let turn = std::f64::consts::TAU * (rx * rx + ry * ry + rz * rz).sqrt();
+    (between && servo && a.gain_muscle.is_none() && [x, y, z] == [0.0; 3] && turn > 0.0).then_some(turn)
 }
 
 /// Bounds of the total actuator force on a degree of freedom.
