@@ -149,10 +149,10 @@ fn gymnasium_mujoco() {
 fn gymnasiums_models_written_anew() {
     let installed = package("gymnasium").join("envs/mujoco/assets");
     let own = xml_files(&workspace().join("assets/gymnasium"));
-    assert_eq!(own.len(), 9);
-    let original = |file: &PathBuf| {
-        let name = file.file_name().expect("a file").to_str().expect("a name");
-        installed.join(if name == "walker2d.xml" { "walker2d_v5.xml" } else { name })
+    assert_eq!(own.len(), 11);
+    let original = |file: &PathBuf| match file.file_name().expect("a file").to_str().expect("a name") {
+        name @ ("walker2d.xml" | "pusher.xml") => installed.join(name.replace(".xml", "_v5.xml")),
+        name => installed.join(name),
     };
     compare_but_looks(&own, &own.iter().map(original).collect::<Vec<_>>(), &[]);
 }

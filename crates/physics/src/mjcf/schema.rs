@@ -420,8 +420,8 @@ const CUSTOM: &[Rule] = &[
     section("tuple", "name", &[rule("element", "objname objtype prm", "", "")]),
 ];
 
-/// It is expanded before the rest of the model is checked.
-const REPLICATE: Rule = world_like(rule("replicate", "count offset euler sep childclass", "", ""));
+/// It is expanded before the rest of the model is checked. MuJoCo 4 accepts a prefix and does not use it.
+const REPLICATE: Rule = world_like(rule("replicate", "count offset euler sep childclass", "prefix", ""));
 
 /// Checks the names of the attributes of a `<replicate>`.
 pub(crate) fn check_replicate(element: &Element) -> Result<(), MjcfError> {

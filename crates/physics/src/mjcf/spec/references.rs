@@ -96,6 +96,12 @@ pub(super) fn leave_tuples(root: &mut Element, gone: &Gone) -> Vec<String> {
     labels
 }
 
+/// Whether an element refers to one of those names.
+pub(super) fn is_any_to(element: &Element, names: &Gone) -> bool {
+    element.attrs.iter().any(|attr| is_one_of(names, element, attr))
+        || element.children.iter().any(|part| is_any_to(part, names))
+}
+
 /// Whether an element refers to those names, and to nothing else but the world.
 pub(super) fn are_all_to(element: &Element, names: &Gone) -> bool {
     let mut any = false;

@@ -1,7 +1,8 @@
 //! Expands `<replicate>`: copies of what it holds, in frames along a path, with numbered names.
 //!
 //! The rules are MuJoCo's. Names in a copy get `sep` and the copy's number. Elements of other sections may refer to things in
-//! the `<replicate>`. If they refer to nothing else but the world, they are copied, too, behind the other elements of their section.
+//! the `<replicate>`. They are copied, too, behind the other elements of their section. Constraints and actuators must refer to nothing
+//! else but the world; MuJoCo leaves out those that do.
 
 use super::super::document::Element;
 use super::super::error::MjcfError;
@@ -17,6 +18,8 @@ use super::references::{self, Gone};
 
 /// Sections whose elements are copied. Each refers to earlier ones only.
 const FOLLOWERS: [&str; 6] = ["contact", "tendon", "equality", "actuator", "sensor", "custom"];
+/// Those whose elements may refer to other things as well.
+const MIXED: [&str; 3] = ["contact", "tendon", "sensor"];
 /// Parts of a body that cannot stand in a frame.
 const NOT_IN_FRAMES: [&str; 3] = ["joint", "freejoint", "inertial"];
 /// Elements that may be looked at; bounds the time that nested copies take.
@@ -121,9 +124,10 @@ impl Expansion<'_> {
             let Some(last) = self.sections.iter().rposition(|s| s.name == section) else { continue };
             let elements: usize = self.sections.iter().filter(|s| s.name == section).map(|s| s.children.len()).sum();
             self.look(replicate, elements)?;
+            let follows = if MIXED.contains(&section) { references::is_any_to } else { references::are_all_to };
             let mut found = Vec::new();
             for section in self.sections.iter_mut().filter(|s| s.name == section) {
-                found.extend(section.children.extract_if(.., |element| references::are_all_to(element, &names)));
+                found.extend(section.children.extract_if(.., |element| follows(element, &names)));
             }
             let named = |element: &Element| {
                 let kind = Kind::of(section, &element.name)?;
