@@ -9,8 +9,9 @@ import pytest
 
 @pytest.hookimpl(wrapper=True)
 def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, object, object]:
-    """Skips a test that starts another program, for an emulator runs only the program that it was given, or needs a package
-    that is not installed there.
+    """Skips a test that starts another program, or needs a package that is not installed there.
+
+    An emulator runs only the program that it was given.
     """
     try:
         return (yield)

@@ -1,7 +1,7 @@
 //! Characters among walls, a lift, a mound, boxes and each other: `cargo run --release -p bevy_marathon --features window --example obstacles`
 //!
-//! Eight characters walk about in a yard. They run into its walls, push boxes, are lifted by a platform, cross a mound, and get out
-//! of each other's way, or fall over each other and get up.
+//! Eight characters walk about in a yard. They run into its walls, push boxes, are lifted by a platform and cross a mound. They
+//! get out of each other's way, or fall over each other and get up.
 
 use bevy::prelude::*;
 use bevy_marathon::prelude::*;

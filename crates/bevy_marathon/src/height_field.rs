@@ -43,11 +43,11 @@ pub(crate) struct LaneField {
 }
 
 impl HeightField {
-    /// Heights in m, row by row: the first row is at the lowest z, and each goes from the lowest to the highest x, over `size` meters
-    /// along x and z.
+    /// Heights in m, row by row, over `size` meters along x and z. The first row is at the lowest z. Each goes from the lowest to
+    /// the highest x.
     ///
-    /// A field of fewer than two rows or columns, an incomplete row, a height that is not finite or a side that is not a length above
-    /// 0 makes an obstacle that is not felt.
+    /// A field with fewer than two rows or columns or with an incomplete row is not felt as an obstacle. The same holds for one with a
+    /// height that is not finite or a side that is not a length above 0.
     pub fn new(size: Vec2, columns: usize, heights: impl Into<Arc<[f32]>>) -> Self {
         HeightField { size, columns, heights: heights.into() }
     }

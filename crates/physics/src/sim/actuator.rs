@@ -28,7 +28,7 @@ pub(crate) struct ActuatorSpec<C> {
     /// In place of gain and bias. Few actuators are muscles, so they do not lengthen the list.
     pub gain_muscle: Option<Box<MuscleSpec<C>>>,
     pub bias_muscle: Option<Box<MuscleSpec<C>>>,
-    /// A full turn in units of the length, and its inverse, for a position servo that turns a site: of all equivalent
+    /// A full turn in units of the length, and its inverse, for a position servo that turns a site. Of all equivalent
     /// angles, the nearest to the target counts.
     pub turn: Option<[C; 2]>,
     /// Whether it is a plain motor: force = gain * input.

@@ -138,7 +138,7 @@ impl Obstacle {
     }
 }
 
-/// What is wrong with the grid of a height field, as [`Obstacle::out_of_range`] says it.
+/// The first fault of the grid of a height field, as [`Obstacle::out_of_range`] names it.
 fn out_of_field(field: &HField) -> Option<(&'static str, f64, &'static str)> {
     if let Some(side) = [field.nrow, field.ncol].into_iter().find(|side| *side < 2) {
         return Some(("side of its field", side as f64, "at least 2 points"));

@@ -1,7 +1,7 @@
 //! `Reacher-v5`: an arm of two links that reaches for a target in the plane, 2 motors.
 //!
-//! Observation: cosines and sines of the two angles, position of the target (2), velocities of the angles, way from
-//! the target to the fingertip along x and y (10).
+//! Observation (10): cosines and sines of the two angles, position of the target, velocities of the angles, way from
+//! the target to the fingertip along x and y.
 //!
 //! Reward: - distance of the fingertip from the target - sum of squared actions. It never terminates.
 
