@@ -10,6 +10,8 @@ use std::sync::Arc;
 
 /// Depth of solid ground below the lowest point, m.
 const BASE: f32 = 1.0;
+/// Largest height and side, m.
+const LARGEST: f32 = 1e5;
 
 /// Heights over a grid, for [`Obstacle::HeightField`](crate::Obstacle). The grid lies in the plane of the x and z axes, with its
 /// center at the origin. Each cell is two flat triangles, split along the diagonal from its low x and high z to its high x and low
@@ -31,6 +33,8 @@ pub struct HeightField {
     size: Vec2,
     columns: usize,
     heights: Arc<[f32]>,
+    /// Lowest and highest height; NaN unless all are lengths that a simulation can have.
+    range: [f32; 2],
 }
 
 /// A field as the physics takes it, and what it was made from.
@@ -47,9 +51,13 @@ impl HeightField {
     /// the highest x.
     ///
     /// A field with fewer than two rows or columns or with an incomplete row is not felt as an obstacle. The same holds for one with a
-    /// height that is not finite or a side that is not a length above 0.
+    /// height or a side beyond 100 km. A scale of the entity counts.
     pub fn new(size: Vec2, columns: usize, heights: impl Into<Arc<[f32]>>) -> Self {
-        HeightField { size, columns, heights: heights.into() }
+        let heights = heights.into();
+        let bad = heights.iter().any(|y| !y.is_finite());
+        let low = heights.iter().copied().fold(0.0, f32::min);
+        let high = heights.iter().copied().fold(0.0, f32::max);
+        HeightField { size, columns, heights, range: if bad { [f32::NAN; 2] } else { [low, high] } }
     }
 
     /// The same from a function of x and z, m, at the points of a grid of so many columns and rows.
@@ -99,7 +107,19 @@ impl HeightField {
         if rows < 2 || columns < 2 { mesh } else { mesh.with_computed_smooth_normals() }
     }
 
-    /// As the physics takes it at a scale, and the radius of a ball around it. `None` if it is no solid.
+    /// Half its sides and the depth of its bottom below the origin at a scale, m. `None` if it is no solid.
+    pub(crate) fn extent(&self, scale: Vec3) -> Option<[f32; 3]> {
+        let ([columns, rows], [low, high]) = (self.points(), self.range);
+        let half = 0.5 * self.size * scale.xz().abs();
+        let depth = BASE - low * scale.y;
+        let whole = columns > 1 && rows > 1 && columns * rows == self.heights.len();
+        let sides = half.min_element() > 1e-3 && half.max_element() < LARGEST;
+        let heights = scale.y > 1e-6 && depth < LARGEST && high * scale.y < LARGEST;
+        (whole && sides && heights).then_some([half.x, half.y, depth])
+    }
+
+    /// As the physics takes it at a scale, and the radius of a ball around it. `None` if it is no solid. The scale along x is
+    /// negative for a mirrored field.
     pub(crate) fn for_lanes(&self, scale: Vec3, last: &mut Option<LaneField>) -> Option<(Arc<HField>, f32)> {
         let same = |last: &&LaneField| {
             let (of, own) = (&last.of, &self.heights);
@@ -109,19 +129,15 @@ impl HeightField {
             return Some((field.clone(), *radius));
         }
         *last = None;
-        let ([ncol, nrow], half) = (self.points(), 0.5 * self.size * scale.xz());
-        let (low, high) = self.heights.iter().fold((0.0_f32, 0.0_f32), |(low, high), y| (low.min(*y), high.max(*y)));
-        let depth = BASE - low * scale.y;
-        let size = [half.x, half.y, scale.y, depth];
-        let whole = ncol > 1 && nrow > 1 && ncol * nrow == self.heights.len();
-        if !whole || !self.heights.iter().all(|y| y.is_finite()) || !size.iter().all(|x| x.is_finite() && *x > 0.0) {
-            return None;
-        }
+        let ([ncol, nrow], [x, z, depth]) = (self.points(), self.extent(scale)?);
         // the physics has the rows along its y axis, which is -z
-        let data = self.heights.chunks(ncol).rev().flatten().copied().collect();
-        let size = size.map(f64::from);
+        let mut data: Vec<f32> = self.heights.chunks(ncol).rev().flatten().copied().collect();
+        if scale.x < 0.0 {
+            data.chunks_mut(ncol).for_each(<[f32]>::reverse);
+        }
+        let size = [x, z, scale.y, depth].map(f64::from);
         let field = Arc::new(HField { name: String::new(), nrow, ncol, size, data });
-        let radius = half.extend(depth.max(high * scale.y)).length();
+        let radius = Vec3::new(x, z, depth.max(self.range[1] * scale.y)).length();
         *last = Some(LaneField { of: self.clone(), scale, field: field.clone(), radius });
         Some((field, radius))
     }
@@ -143,6 +159,8 @@ mod tests {
         // made once
         let again = field.for_lanes(Vec3::new(1.0, 2.0, 3.0), &mut last).map(|(again, _)| again);
         assert!(again.is_some_and(|again| Arc::ptr_eq(&again, &lanes)));
+        let mirrored = field.for_lanes(Vec3::new(-1.0, 1.0, 1.0), &mut last).map(|(field, _)| field.data.clone());
+        assert_eq!(mirrored, Some(vec![-8.0, -10.0, -12.0, 12.0, 10.0, 8.0]));
         let larger = field.for_lanes(Vec3::ONE, &mut last).map(|(larger, _)| larger.size[2]);
         assert_eq!(larger, Some(1.0));
     }
@@ -160,7 +178,10 @@ mod tests {
             (one, 2, vec![0.0, 0.0, nan, 0.0]),
             (Vec2::new(1.0, 0.0), 2, vec![0.0; 4]),
             (Vec2::new(nan, 1.0), 2, vec![0.0; 4]),
+            (-one, 2, vec![0.0; 4]),
             (one, 0, vec![]),
+            (one, 2, vec![0.0, 0.0, 0.0, f32::MIN]),
+            (one, 2, vec![3e38; 4]),
         ] {
             let field = HeightField::new(size, columns, heights);
             assert!(!solid(&field), "{field:?}");

@@ -278,6 +278,6 @@ fn wrong_numbers_are_named() {
     };
     assert_eq!(field(|f| f.nrow = 1), Some(("side of its field", 1.0, "at least 2 points")));
     assert_eq!(field(|f| f.ncol = 5), Some(("field of this many elevations", 30.0, "one per row and column")));
-    assert_eq!(field(|f| f.data[3] = -2.0), Some(("elevation", -2.0, "a finite number above the base")));
+    assert_eq!(field(|f| f.data[3] = -2.0), Some(("elevation", -2.0, "a number above the base and below 1e8")));
     assert_eq!(field(|f| f.size[1] = 0.0), Some(("size of its field", 0.0, "a length above 0")));
 }

@@ -44,7 +44,7 @@ enum Shape<'a> {
 /// A height field with its present elevations, m.
 enum Field<'a> {
     Model { of: &'a HField, own: Option<&'a [f32]> },
-    App { of: &'a HeightField, scale: Vec3 },
+    App { of: &'a HeightField, extent: [f32; 3], scale: Vec3 },
 }
 
 impl<'a> Obstacles<'a> {
@@ -77,7 +77,7 @@ impl<'a> Obstacles<'a> {
     pub fn add(&mut self, app: impl Iterator<Item = (&'a Obstacle, &'a GlobalTransform)>) {
         let solids = app.filter_map(|(obstacle, place)| {
             let (scale, rotation, translation) = place.to_scale_rotation_translation();
-            let shape = Shape::of_app(obstacle, scale.abs())?;
+            let shape = Shape::of_app(obstacle, scale)?;
             let thin = shape.sides().is_some_and(|[a, b, _]| a < THIN && b < THIN);
             let inverse = Affine3A::from_rotation_translation(rotation, translation).inverse();
             Some(Solid { inverse, shape, thin })
@@ -136,17 +136,19 @@ fn is_there(geom: &Geom) -> bool {
 impl<'a> Shape<'a> {
     /// The shape of an obstacle of the app at a scale. None for one that nothing feels.
     fn of_app(obstacle: &'a Obstacle, scale: Vec3) -> Option<Self> {
-        // height fields that are no solids have no points, or none that are near
-        if !matches!(obstacle, Obstacle::HeightField(_)) {
-            obstacle.shape(scale, &mut None)?;
+        if let Obstacle::HeightField(of) = obstacle {
+            let extent = of.extent(scale)?;
+            return Some(Shape::Field(Field::App { of, extent, scale }));
         }
+        obstacle.shape(scale, &mut None)?;
+        let scale = scale.abs();
         Some(match *obstacle {
             Obstacle::Sphere { radius } => Shape::Sphere(radius * scale.max_element()),
             Obstacle::Capsule { radius, half_length } => {
                 Shape::Capsule(radius * scale.x.max(scale.z), half_length * scale.y)
             }
             Obstacle::Cuboid { half_size } => Shape::Cuboid(half_size * scale),
-            Obstacle::HeightField(ref of) => Shape::Field(Field::App { of, scale }),
+            Obstacle::HeightField(_) => return None,
         })
     }
 
@@ -212,12 +214,10 @@ impl Field<'_> {
                 let [x, y, _, base] = of.size.map(|side| side as f32);
                 (-p.z, [x, y], [of.ncol, of.nrow], -base)
             }
-            Field::App { of, scale } => {
-                let half = 0.5 * of.size() * scale.xz();
-                (p.z, half.to_array(), of.points(), f32::NEG_INFINITY)
-            }
+            Field::App { of, extent: [x, z, depth], .. } => (p.z, [*x, *z], of.points(), -depth),
         };
-        let (rows, columns) = (span(along, half[1], rows, around), span(p.x, half[0], columns, around));
+        let across = if matches!(self, Field::App { scale, .. } if scale.x < 0.0) { -p.x } else { p.x };
+        let (rows, columns) = (span(along, half[1], rows, around), span(across, half[0], columns, around));
         let (Some(rows), Some(columns)) = (rows, columns) else { return f32::INFINITY };
         let top = rows.flat_map(|row| columns.clone().map(move |column| self.height(row, column)));
         let top = top.fold(f32::NEG_INFINITY, f32::max);
@@ -227,7 +227,7 @@ impl Field<'_> {
     fn height(&self, row: usize, column: usize) -> f32 {
         match *self {
             Field::Model { of, own } => elevation(of, own, row, column),
-            Field::App { of, scale } => {
+            Field::App { of, scale, .. } => {
                 scale.y * of.heights().get(row * of.points()[0] + column).copied().unwrap_or_default()
             }
         }

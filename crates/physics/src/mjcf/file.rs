@@ -17,7 +17,9 @@ pub(crate) struct FileError {
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, FileError> {
     let is_missing = |e: &std::io::Error| e.kind() == std::io::ErrorKind::NotFound;
     let bytes = match budget::read(path, &MODEL_FILE) {
-        Err(e) if is_missing(&e) => budget::read(&shortened(path), &MODEL_FILE).map_err(|_| e),
+        Err(e) if path.components().any(|part| part == Component::ParentDir) => {
+            budget::read(&shortened(path), &MODEL_FILE).map_err(|_| e)
+        }
         bytes => bytes,
     };
     bytes.map_err(|e| FileError { missing: is_missing(&e), reason: e.to_string() })

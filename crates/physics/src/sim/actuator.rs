@@ -119,7 +119,7 @@ fn full_turn(a: &Actuator) -> Option<f64> {
     let ([x, y, z, rx, ry, rz], servo) =
         (a.gear, a.gain[1..] == [0.0; 2] && a.gain[0] != 0.0 && a.bias[1] == -a.gain[0]);
     let turn = std::f64::consts::TAU * (rx * rx + ry * ry + rz * rz).sqrt();
-    (between && servo && a.gain_muscle.is_none() && [x, y, z] == [0.0; 3] && turn > 0.0).then_some(turn)
+    (between && servo && a.gain_muscle.is_none() && [x, y, z] == [0.0; 3] && turn > 1e-20).then_some(turn)
 }
 
 /// Bounds of the total actuator force on a degree of freedom.

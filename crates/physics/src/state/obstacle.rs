@@ -26,7 +26,8 @@ pub enum ObstacleShape {
         /// Half its extent along each axis.
         half_size: Vec3,
     },
-    /// A height field. Its elevations are finite, and can be of any sign above the base.
+    /// A height field. Its elevations are finite and above the base; they need not be between 0 and 1. Saved states leave out its
+    /// name.
     HField(#[serde(with = "shared")] Arc<HField>),
 }
 
@@ -146,9 +147,13 @@ fn out_of_field(field: &HField) -> Option<(&'static str, f64, &'static str)> {
     if field.nrow.checked_mul(field.ncol) != Some(field.data.len()) {
         return Some(("field of this many elevations", field.data.len() as f64, "one per row and column"));
     }
+    // lanes divide by sides in single precision
+    if let Some(x) = field.size.iter().find(|x| **x > 0.0 && !(1e-6..1e8).contains(*x)) {
+        return Some(("size of its field", *x, "a length from 1e-6 to 1e8"));
+    }
     let below = -field.size[3] / field.size[2];
-    let wrong = field.data.iter().map(|x| f64::from(*x)).find(|x| !(x.is_finite() && *x > below));
-    wrong.map(|x| ("elevation", x, "a finite number above the base"))
+    let wrong = field.data.iter().map(|x| f64::from(*x)).find(|x| !(*x > below && *x * field.size[2] < 1e8));
+    wrong.map(|x| ("elevation", x, "a number above the base and below 1e8"))
 }
 
 /// Takes `count` numbers from the front of some bytes.
