@@ -112,5 +112,5 @@ fn a_turned_world_moves_alike() {
         touched += usize::from(contacts > 0);
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
-    assert!(models == 19 && touched >= 11, "{touched} of {models} models touched the floor");
+    assert!(models == 21 && touched >= 11, "{touched} of {models} models touched the floor");
 }

@@ -212,9 +212,9 @@ fn copies() {
     ] {
         check(&in_body(content), &[&["bad.xml:5:"], parts].concat());
     }
-    // what also refers to other things is not copied, and the name without a number is gone
+    // a constraint that also refers to other things is not copied, and the name without a number is gone
     let xml = "<mujoco><worldbody><replicate count='2'><body name='a'><geom size='1'/></body></replicate>
-        <body name='b'><geom size='1'/></body></worldbody><contact><exclude body1='a' body2='b'/></contact></mujoco>";
+        <body name='b'><geom size='1'/></body></worldbody><equality><connect body1='a' body2='b' anchor='0 0 0'/></equality></mujoco>";
     check(xml, &["there is no body 'a'", "'a0'"]);
 }
 

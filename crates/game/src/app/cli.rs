@@ -151,8 +151,8 @@ pub struct Args {
     #[arg(long)]
     pub joints: bool,
 
-    /// Video to write instead of opening a window: .mp4 (needs ffmpeg), .png (one picture, of the last frame), or a folder for
-    /// a sequence of .png.
+    /// Video to write instead of opening a window: .mp4 (needs ffmpeg), .gif, .png (one picture, of the last frame), or a folder
+    /// for a sequence of .png.
     #[arg(long, value_name = "OUT")]
     pub record: Option<PathBuf>,
     /// Times of the video.
@@ -260,7 +260,7 @@ const GROUNDS: [Choice<Ground>; 4] = [
 ];
 
 const QUALITIES: [Choice<Quality>; 3] = [
-    ("low", Quality::Low, "No shadows, no smoothed edges"),
+    ("low", Quality::Low, "Soft discs in place of shadows, no smoothed edges"),
     ("medium", Quality::Medium, "Shadows, edges smoothed"),
     ("high", Quality::High, "Larger shadow maps"),
 ];

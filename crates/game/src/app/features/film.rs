@@ -18,6 +18,7 @@ use bevy::prelude::*;
 use bevy_marathon::look::{CameraMode, FollowCamera};
 use bevy_marathon::{Anatomy, Episode, Marathon, MarathonSystems, RagdollState, Track};
 use std::ffi::OsString;
+use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread::JoinHandle;
@@ -143,7 +144,7 @@ fn draw(program: &Path, recording: &Recording, words: &[OsString]) -> Result<Pat
     recording.save(&replay).map_err(|e| e.to_string())?;
     let quiet = |program: &Path| {
         let mut command = Command::new(program);
-        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
         command
     };
     let ffmpeg = quiet(Path::new("ffmpeg")).arg("-version").output().is_ok_and(|output| output.status.success());
@@ -154,11 +155,16 @@ fn draw(program: &Path, recording: &Recording, words: &[OsString]) -> Result<Pat
     let mut command = quiet(program);
     command.arg("--replay").arg(&replay).arg("--record").arg(&film).args(words);
     command.args(["--size", size, "--fps", fps, "--seconds", &seconds, "--no-hud"]);
-    let output = command.output().map_err(|e| format!("{}: {e}", program.display()))?;
-    if output.status.success() {
+    // a pipe would end with this game, and the film with it
+    let mut log = tempfile::tempfile().map_err(|e| e.to_string())?;
+    command.stderr(log.try_clone().map_err(|e| e.to_string())?);
+    let status = command.status().map_err(|e| format!("{}: {e}", program.display()))?;
+    if status.success() {
         return std::path::absolute(&film).or(Ok(film));
     }
-    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    let mut said = Vec::new();
+    let _ = log.rewind().and_then(|()| log.read_to_end(&mut said));
+    let text = String::from_utf8_lossy(&said);
     let last = text.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("it gave no reason");
     Err(format!("{last}; its states are in {}", replay.display()))
 }

@@ -196,17 +196,19 @@ fn notice(
     let (Some(values), Some(root)) = (command.values(), root(&marathon, key)) else { return };
     let dt = time.delta_secs();
     let Prompts { done, progress, current, .. } = prompts;
-    if root.speed > 0.3 {
+    // a flip moves and turns, too
+    let steers = ranges.iter().zip(values).any(|(range, value)| range.is_speed() && value.abs() > 0.1);
+    if steers && root.speed > 0.3 {
         progress.walked += root.speed * dt;
     }
     done[Prompt::Walk as usize] |= progress.walked > WALKED;
-    if *current == Some(Prompt::Turn) {
+    if steers && *current == Some(Prompt::Turn) {
         let from = *progress.heading.get_or_insert(root.heading);
         let turned = (root.heading - from).sin().atan2((root.heading - from).cos()).abs();
         done[Prompt::Turn as usize] |= turned as f32 > TURNED;
     }
     let fastest = ranges.iter().find(|range| range.is_speed()).map_or(f64::INFINITY, |range| range.high);
-    done[Prompt::Run as usize] |= root.speed > RUNS * fastest as f32;
+    done[Prompt::Run as usize] |= steers && root.speed > RUNS * fastest as f32;
     let buttons = ranges.iter().zip(values).filter(|(range, _)| range.is_button());
     for (since, (_, value)) in progress.pressed.iter_mut().zip(buttons) {
         *since = if *value > 0.5 { CREDIT } else { *since - dt };
@@ -217,7 +219,7 @@ fn notice(
 
 /// Chooses the prompt.
 fn choose(
-    time: Res<Time<Real>>,
+    time: Res<Time<Virtual>>,
     (settings, keys_for, steering): (Res<Settings>, Res<KeysFor>, Res<Steering>),
     (scenario, focus, bindings, device): (Res<Scenario>, Res<Focus>, Res<Bindings>, Res<DeviceInUse>),
     mut prompts: ResMut<Prompts>,
