@@ -28,8 +28,8 @@ def pair(id: str, **options) -> tuple[gymnasium.Env, gymnasium.Env]:
     return gymnasium.make(f"marathon_rl/{id}", isa="f64", **options), theirs
 
 
-def test_there_are_nine() -> None:
-    assert len(IDS) == 9
+def test_there_are_eleven() -> None:
+    assert len(IDS) == 11
 
 
 @pytest.mark.parametrize(("id", "options"), [(id, {}) for id in IDS] + list(KEYWORDS.items()))
