@@ -33,8 +33,8 @@ pub struct HeightField {
     size: Vec2,
     columns: usize,
     heights: Arc<[f32]>,
-    /// Lowest and highest height; NaN unless all are lengths that a simulation can have.
-    range: [f32; 2],
+    /// Lowest and highest height and 0; `None` unless all are finite.
+    range: Option<[f32; 2]>,
 }
 
 /// A field as the physics takes it, and what it was made from.
@@ -54,15 +54,13 @@ impl HeightField {
     /// height or a side beyond 100 km. A scale of the entity counts.
     pub fn new(size: Vec2, columns: usize, heights: impl Into<Arc<[f32]>>) -> Self {
         let heights = heights.into();
-        let bad = heights.iter().any(|y| !y.is_finite());
-        let low = heights.iter().copied().fold(0.0, f32::min);
-        let high = heights.iter().copied().fold(0.0, f32::max);
-        HeightField { size, columns, heights, range: if bad { [f32::NAN; 2] } else { [low, high] } }
+        let finite = heights.iter().all(|y| y.is_finite());
+        let range = || heights.iter().fold([0.0_f32; 2], |[low, high], y| [low.min(*y), high.max(*y)]);
+        HeightField { size, columns, range: finite.then(range), heights }
     }
 
     /// The same from a function of x and z, m, at the points of a grid of so many columns and rows.
     pub fn from_fn(size: Vec2, [columns, rows]: [usize; 2], height: impl Fn(f32, f32) -> f32) -> Self {
-        let line = |i: usize, count: usize, side: f32| side * (i as f32 / (count.max(2) - 1) as f32 - 0.5);
         let heights = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
         let heights = heights.map(|(row, column)| height(line(column, columns, size.x), line(row, rows, size.y)));
         HeightField::new(size, columns, heights.collect::<Vec<_>>())
@@ -87,9 +85,8 @@ impl HeightField {
     #[cfg(feature = "render")]
     pub fn mesh(&self) -> Mesh {
         let [columns, rows] = self.points();
-        let place = |i: usize, count: usize, side: f32| side * (i as f32 / (count.max(2) - 1) as f32 - 0.5);
         let points = (0..rows * columns).map(|i| {
-            let (x, z) = (place(i % columns, columns, self.size.x), place(i / columns, rows, self.size.y));
+            let (x, z) = (line(i % columns, columns, self.size.x), line(i / columns, rows, self.size.y));
             [x, self.heights[i], z]
         });
         let points: Vec<[f32; 3]> = points.collect();
@@ -109,11 +106,11 @@ impl HeightField {
 
     /// Half its sides and the depth of its bottom below the origin at a scale, m. `None` if it is no solid.
     pub(crate) fn extent(&self, scale: Vec3) -> Option<[f32; 3]> {
-        let ([columns, rows], [low, high]) = (self.points(), self.range);
+        let ([columns, rows], [low, high]) = (self.points(), self.range?);
         let half = 0.5 * self.size * scale.xz().abs();
         let depth = BASE - low * scale.y;
         let whole = columns > 1 && rows > 1 && columns * rows == self.heights.len();
-        let sides = half.min_element() > 1e-3 && half.max_element() < LARGEST;
+        let sides = half.to_array().iter().all(|side| (1e-3..LARGEST).contains(side));
         let heights = scale.y > 1e-6 && depth < LARGEST && high * scale.y < LARGEST;
         (whole && sides && heights).then_some([half.x, half.y, depth])
     }
@@ -137,10 +134,15 @@ impl HeightField {
         }
         let size = [x, z, scale.y, depth].map(f64::from);
         let field = Arc::new(HField { name: String::new(), nrow, ncol, size, data });
-        let radius = Vec3::new(x, z, depth.max(self.range[1] * scale.y)).length();
+        let radius = Vec3::new(x, z, depth.max(self.range?[1] * scale.y)).length();
         *last = Some(LaneField { of: self.clone(), scale, field: field.clone(), radius });
         Some((field, radius))
     }
+}
+
+/// Coordinate of one of the lines of a grid along a side, m.
+fn line(i: usize, count: usize, side: f32) -> f32 {
+    side * (i as f32 / (count.max(2) - 1) as f32 - 0.5)
 }
 
 #[cfg(test)]

@@ -49,13 +49,12 @@ impl Obstacle {
     /// Its shape in the axes of the physics at a scale, and the radius of a ball around it. `None` if a size is not a length above 0.
     /// The terrain of the last call is in `last`.
     pub(crate) fn shape(&self, scale: Vec3, last: &mut Option<LaneField>) -> Option<(ObstacleShape, f32)> {
-        if let Obstacle::HeightField(field) = self {
-            let (field, radius) = field.for_lanes(scale, last)?;
-            return Some((ObstacleShape::HField(field), radius));
-        }
-        let scale = scale.abs();
+        let (signed, scale) = (scale, scale.abs());
         let (size, shape, radius): (Vec3, _, _) = match *self {
-            Obstacle::HeightField(_) => return None,
+            Obstacle::HeightField(ref field) => {
+                let (field, radius) = field.for_lanes(signed, last)?;
+                return Some((ObstacleShape::HField(field), radius));
+            }
             Obstacle::Sphere { radius } => {
                 let radius = radius * scale.max_element();
                 (Vec3::splat(radius), ObstacleShape::Sphere { radius: radius.into() }, radius)

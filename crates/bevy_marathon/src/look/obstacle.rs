@@ -44,7 +44,7 @@ enum Shape<'a> {
 /// A height field with its present elevations, m.
 enum Field<'a> {
     Model { of: &'a HField, own: Option<&'a [f32]> },
-    App { of: &'a HeightField, extent: [f32; 3], scale: Vec3 },
+    App { of: &'a HeightField, extent: [f32; 3], height: f32 },
 }
 
 impl<'a> Obstacles<'a> {
@@ -79,7 +79,9 @@ impl<'a> Obstacles<'a> {
             let (scale, rotation, translation) = place.to_scale_rotation_translation();
             let shape = Shape::of_app(obstacle, scale)?;
             let thin = shape.sides().is_some_and(|[a, b, _]| a < THIN && b < THIN);
-            let inverse = Affine3A::from_rotation_translation(rotation, translation).inverse();
+            // all shapes but height fields are their own mirror image
+            let mirror = Vec3::new(scale.x.signum(), 1.0, 1.0);
+            let inverse = Affine3A::from_scale_rotation_translation(mirror, rotation, translation).inverse();
             Some(Solid { inverse, shape, thin })
         });
         self.solids.extend(solids);
@@ -138,7 +140,7 @@ impl<'a> Shape<'a> {
     fn of_app(obstacle: &'a Obstacle, scale: Vec3) -> Option<Self> {
         if let Obstacle::HeightField(of) = obstacle {
             let extent = of.extent(scale)?;
-            return Some(Shape::Field(Field::App { of, extent, scale }));
+            return Some(Shape::Field(Field::App { of, extent, height: scale.y }));
         }
         obstacle.shape(scale, &mut None)?;
         let scale = scale.abs();
@@ -216,8 +218,7 @@ impl Field<'_> {
             }
             Field::App { of, extent: [x, z, depth], .. } => (p.z, [*x, *z], of.points(), -depth),
         };
-        let across = if matches!(self, Field::App { scale, .. } if scale.x < 0.0) { -p.x } else { p.x };
-        let (rows, columns) = (span(along, half[1], rows, around), span(across, half[0], columns, around));
+        let (rows, columns) = (span(along, half[1], rows, around), span(p.x, half[0], columns, around));
         let (Some(rows), Some(columns)) = (rows, columns) else { return f32::INFINITY };
         let top = rows.flat_map(|row| columns.clone().map(move |column| self.height(row, column)));
         let top = top.fold(f32::NEG_INFINITY, f32::max);
@@ -227,8 +228,8 @@ impl Field<'_> {
     fn height(&self, row: usize, column: usize) -> f32 {
         match *self {
             Field::Model { of, own } => elevation(of, own, row, column),
-            Field::App { of, scale, .. } => {
-                scale.y * of.heights().get(row * of.points()[0] + column).copied().unwrap_or_default()
+            Field::App { of, height, .. } => {
+                height * of.heights().get(row * of.points()[0] + column).copied().unwrap_or_default()
             }
         }
     }
