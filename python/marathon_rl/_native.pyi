@@ -576,6 +576,28 @@ class Model:
     @staticmethod
     def from_xml_string(xml: str, /, name: str = "model") -> Model:
         """Compile a model given as text, which has no other files; `name` stands for the file in messages."""
+    def edit(
+        self,
+        changes: dict[str, dict[str, Any]],
+        *,
+        remove: dict[str, Sequence[str]] | None = None,
+    ) -> Model:
+        """Make a copy with other attributes of its elements.
+
+        Attributes have the names and the units of the file. A wrong name is an error that lists the nearest valid one.
+        The models of tasks cannot be edited.
+
+        Args:
+            changes: new values by kind, name and attribute, such as ``{"geom": {"floor": {"friction": 0.4}}}``, or by
+                section and attribute: ``{"option": {"iterations": 50}}``. Kinds are ``body``, ``joint``, ``geom``,
+                ``site``, ``camera``, ``light``, ``hfield``, ``mesh``, ``tendon``, ``equality``, ``pair``, ``exclude``,
+                ``actuator``, ``sensor`` and ``key``; sections are ``compiler``, ``option``, ``statistic`` and
+                ``visual``. A value is a text, a bool, a number or a list of numbers; None takes the attribute away.
+            remove: names of elements to remove, by kind. All that refers to them goes, too.
+        """
+    @property
+    def option(self) -> dict[str, Any]:
+        """Settings of the physics and of its solver, by the names of MJCF's ``option``: a new dict."""
     @property
     def name(self) -> str:
         """Name of the model."""
@@ -721,11 +743,19 @@ class Simulation:
         Returns which agents broke, ``(num_envs,)``: their states stopped being finite, so they were put into the
         reference configuration at rest.
         """
-    def reset(self, qpos: npt.ArrayLike, qvel: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> None:
+    def reset(
+        self,
+        qpos: npt.ArrayLike,
+        qvel: npt.ArrayLike,
+        mask: npt.ArrayLike | None = None,
+        *,
+        act: npt.ArrayLike | None = None,
+    ) -> None:
         """Put agents, all or those of a mask, into states.
 
-        The states are rows of `qpos`, ``(num_envs, nq)``, and `qvel`, ``(num_envs, nv)``. Quaternions are
-        normalized; controls, pushes and contacts are forgotten.
+        The states are rows of `qpos`, ``(num_envs, nq)``, and `qvel`, ``(num_envs, nv)``, and the activations of
+        actuators those of `act`, ``(num_envs, na)``, or 0. Quaternions are normalized. Controls, pushes and contacts
+        are forgotten.
         """
     def push(
         self,
@@ -801,6 +831,29 @@ class Simulation:
     @property
     def qvel(self) -> npt.NDArray[np.float64]:
         """Velocity, ``(num_envs, nv)``."""
+    @property
+    def act(self) -> npt.NDArray[np.float64]:
+        """Activations of the actuators that have one, ``(num_envs, na)``."""
+    @property
+    def qacc(self) -> npt.NDArray[np.float64]:
+        """Accelerations at the present state and controls, ``(num_envs, nv)``.
+
+        This and the forces cost about as much as a physics step.
+        """
+    @property
+    def qfrc_constraint(self) -> npt.NDArray[np.float64]:
+        """Forces of contacts, limits, dry friction and equalities on the joints, N or N m, ``(num_envs, nv)``."""
+    @property
+    def actuator_force(self) -> npt.NDArray[np.float64]:
+        """Forces of the actuators at the present state and controls, N or N m, ``(num_envs, nu)``."""
+    def contacts(self, agent: int = 0) -> dict[str, npt.NDArray[Any]]:
+        """Contacts of an agent at the present state and controls, in new arrays.
+
+        ``geom``, ``(n, 2)``, has the indices of the two geoms; ``pos``, ``(n, 3)``, the places, m; ``normal``, ``(n,
+        3)``, the directions from the first geom to the second; ``force``, ``(n, 3)``, the forces on the second geom, N;
+        ``torque``, ``(n, 3)``, the torques on it about the place, N m, which only contacts that resist twisting or
+        rolling have.
+        """
     @property
     def body_pos(self) -> npt.NDArray[np.float64]:
         """Origins of the bodies' frames, m, ``(num_envs, nbody, 3)``."""

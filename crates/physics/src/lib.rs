@@ -68,7 +68,7 @@ mod batch;
 pub use algebra::spatial;
 pub use algebra::spatial::rot_to_quat;
 pub use batch::workload;
-pub use batch::{Batch, BatchOptions, Blowup, BodyReading, Quantity, Replay, Snapshot};
+pub use batch::{Batch, BatchOptions, Blowup, BodyReading, ContactReading, Quantity, Replay, Snapshot};
 pub use lanes::{Isa, Real};
 pub use mjcf::spec;
 pub use model::Model;

@@ -14,6 +14,7 @@ mod error;
 mod inputs;
 mod interrupt;
 mod model;
+mod model_edit;
 mod number;
 mod options;
 mod players;

@@ -1,11 +1,13 @@
 //! A compiled model file: what is in it, by name and by index.
 
-use crate::{error, number};
+use crate::{error, model_edit, number};
 use marathon_physics::hint::among;
+use marathon_physics::mjcf::MjcfError;
 use marathon_physics::model::{Joint, JointType};
+use marathon_physics::spec::ModelSpec;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyString;
+use pyo3::types::{PyDict, PyString};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -18,6 +20,8 @@ type Indices<'py> = Bound<'py, PyArray1<i64>>;
 #[pyclass(frozen, module = "marathon_rl")]
 pub struct Model {
     pub(crate) inner: Arc<marathon_physics::Model>,
+    /// The file before it was compiled. `None` for models of tasks.
+    pub(crate) spec: Option<ModelSpec>,
 }
 
 #[pymethods]
@@ -26,14 +30,32 @@ impl Model {
     #[staticmethod]
     #[pyo3(signature = (path, /))]
     fn from_xml_path(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        Self::of(py.detach(|| marathon_physics::Model::from_xml_file(path)))
+        Self::of(py, || ModelSpec::from_xml_file(path))
     }
 
     /// Compiles a model given as text, which has no other files; `name` stands for the file in messages.
     #[staticmethod]
     #[pyo3(signature = (xml, /, name = "model"))]
     fn from_xml_string(py: Python<'_>, xml: &str, name: &str) -> PyResult<Self> {
-        Self::of(py.detach(|| marathon_physics::Model::from_xml_str(xml, name)))
+        Self::of(py, || ModelSpec::from_xml_str(xml, name))
+    }
+
+    /// A copy of the model with other attributes, `{kind: {name: {attribute: value}}}` or `{section: {attribute: value}}`, and
+    /// without the elements of `remove`, `{kind: [name]}`, and what refers to them.
+    #[pyo3(signature = (changes, *, remove = None))]
+    fn edit(&self, py: Python<'_>, changes: &Bound<'_, PyDict>, remove: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let Some(spec) = &self.spec else {
+            let expected = "expected one of Model.from_xml_path or Model.from_xml_string";
+            return Err(error::value(format!("the model of a task cannot be edited, {expected}")));
+        };
+        let spec = model_edit::edited(spec, changes, remove)?;
+        Self::of(py, || Ok(spec))
+    }
+
+    /// The settings of the physics as in MJCF's `option`: a new dict.
+    #[getter]
+    fn option<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        model_edit::option(py, self)
     }
 
     /// Name of the model.
@@ -288,8 +310,11 @@ impl Model {
         fields.get(field).map(|h| [h.nrow, h.ncol]).ok_or_else(beyond)
     }
 
-    fn of(model: Result<marathon_physics::Model, marathon_physics::mjcf::MjcfError>) -> PyResult<Self> {
-        Ok(Model { inner: Arc::new(model.map_err(|e| error::value(e.to_string()))?) })
+    /// Reads and compiles a model without the GIL.
+    fn of(py: Python<'_>, read: impl FnOnce() -> Result<ModelSpec, MjcfError> + Send) -> PyResult<Self> {
+        let compile = || read().and_then(|spec| Ok((spec.compile()?, spec)));
+        let (model, spec) = py.detach(compile).map_err(|e| error::value(e.to_string()))?;
+        Ok(Model { inner: Arc::new(model), spec: Some(spec) })
     }
 }
 

@@ -64,7 +64,7 @@ macro_rules! arguments {
     };
 }
 
-arguments!(body, field, seed);
+arguments!(agent, body, field, seed);
 
 /// Converters for numbers of steps.
 macro_rules! amounts {

@@ -6,13 +6,13 @@ use crate::inputs::{self, Constants, Grounds, grounds_array};
 use crate::model::Model;
 use crate::{error, number};
 use marathon_physics::budget::AGENTS_MEMORY;
-use marathon_physics::{AgentState, Batch, BatchOptions, Isa, Quantity, Variation};
+use marathon_physics::{AgentState, Batch, BatchOptions, ContactReading, Isa, Quantity, Variation};
 use numpy::ndarray::Ix2;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods};
 use pyo3::basic::CompareOp;
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::{PyBytes, PyDict};
 use std::sync::Mutex;
 
 /// Most threads. Each has working memory of its own.
@@ -131,27 +131,37 @@ impl Simulation {
     }
 
     /// Puts agents, all or those of a mask, `(num_envs,)`, into the states in the rows of `qpos`, `(num_envs, nq)`, and
-    /// `qvel`, `(num_envs, nv)`. Quaternions are normalized; controls, pushes and contacts are forgotten.
-    #[pyo3(signature = (qpos, qvel, mask = None))]
+    /// `qvel`, `(num_envs, nv)`, with the activations `act`, `(num_envs, na)`, or 0. Quaternions are normalized; controls, pushes and
+    /// contacts are forgotten.
+    #[pyo3(signature = (qpos, qvel, mask = None, *, act = None))]
     fn reset(
         slf: &Bound<'_, Self>,
         qpos: &Bound<'_, PyAny>,
         qvel: &Bound<'_, PyAny>,
         mask: Option<&Bound<'_, PyAny>>,
+        act: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let this = &mut *exclusive(slf)?;
         let mask = self::mask(mask, this.num_envs)?;
         let model = &this.model.get().inner;
         let qpos = of_shape::<f64, Ix2, 2>("qpos has", qpos, [this.num_envs, model.nq])?;
         let qvel = of_shape::<f64, Ix2, 2>("qvel has", qvel, [this.num_envs, model.nv])?;
-        let (qpos, qvel) = (qpos.as_array(), qvel.as_array());
+        let shape = [this.num_envs, model.na];
+        let act = act.map(|act| of_shape::<f64, Ix2, 2>("act has", act, shape)).transpose()?;
+        let (qpos, qvel, act) = (qpos.as_array(), qvel.as_array(), act.as_ref().map(|act| act.as_array()));
         let chosen = || (0..mask.len()).filter(|i| mask[*i]);
         if let Some(i) = chosen().find(|i| !qpos.row(*i).iter().chain(qvel.row(*i)).all(|x| x.is_finite())) {
             return Err(error::value(format!("the state of agent {i} is not finite")));
         }
+        if let Some(i) = chosen().find(|i| act.is_some_and(|act| act.row(*i).iter().any(|x| !x.is_finite()))) {
+            return Err(error::value(format!("act of agent {i} is not finite")));
+        }
         this.read.clear();
         for i in chosen() {
             this.batch().reset(i, &qpos.row(i).to_vec(), &qvel.row(i).to_vec());
+            if let Some(act) = act {
+                this.batch().set_act(i, &act.row(i).to_vec());
+            }
         }
         Ok(())
     }
@@ -298,6 +308,60 @@ impl Simulation {
     #[getter]
     fn qvel(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
         exclusive(slf)?.reading(py, Quantity::Qvel)
+    }
+
+    /// Activations of the actuators that have one, `(num_envs, na)`.
+    #[getter]
+    fn act(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        exclusive(slf)?.reading(py, Quantity::Act)
+    }
+
+    /// Accelerations at the present state and controls, `(num_envs, nv)`.
+    #[getter]
+    fn qacc(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        exclusive(slf)?.reading(py, Quantity::Qacc)
+    }
+
+    /// Forces of contacts, limits, dry friction and equalities on the joints at the present state and controls, N or N m,
+    /// `(num_envs, nv)`.
+    #[getter]
+    fn qfrc_constraint(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        exclusive(slf)?.reading(py, Quantity::QfrcConstraint)
+    }
+
+    /// Forces of the actuators at the present state and controls, N or N m, `(num_envs, nu)`.
+    #[getter]
+    fn actuator_force(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        exclusive(slf)?.reading(py, Quantity::ActuatorForce)
+    }
+
+    /// Contacts of an agent at the present state and controls: a dict of arrays, `geom`, `(n, 2)`, and `pos`, `normal`, `force` and
+    /// `torque`, `(n, 3)`.
+    #[pyo3(signature = (agent = 0))]
+    fn contacts<'py>(
+        slf: &Bound<'_, Self>,
+        py: Python<'py>,
+        #[pyo3(from_py_with = number::agent)] agent: usize,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let this = &mut *exclusive(slf)?;
+        if agent >= this.num_envs {
+            return Err(error::value(format!("agent is {agent}, expected less than {}", this.num_envs)));
+        }
+        let batch = this.batch();
+        let all = py.detach(|| batch.contacts(agent));
+        let out = PyDict::new(py);
+        let geoms = all.iter().flat_map(|contact| contact.geoms.map(|geom| geom as i64));
+        out.set_item("geom", PyArray1::from_iter(py, geoms).reshape([all.len(), 2])?)?;
+        let fields: [(&str, fn(&ContactReading) -> [f64; 3]); 4] = [
+            ("pos", |contact| contact.pos),
+            ("normal", |contact| contact.normal),
+            ("force", |contact| contact.force),
+            ("torque", |contact| contact.torque),
+        ];
+        for (name, of) in fields {
+            out.set_item(name, PyArray1::from_iter(py, all.iter().flat_map(of)).reshape([all.len(), 3])?)?;
+        }
+        Ok(out)
     }
 
     /// Origins of the bodies' frames, m, `(num_envs, nbody, 3)`.

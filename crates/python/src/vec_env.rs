@@ -525,7 +525,7 @@ impl VecEnv {
             let spec = self.spec.get();
             let agent = registry::global().agent_with(&spec.id, &spec.options).map_err(error::env)?;
             let inner = Arc::new(agent.model().map_err(error::env)?);
-            self.model = Some(Py::new(py, Model { inner })?);
+            self.model = Some(Py::new(py, Model { inner, spec: None })?);
         }
         Ok(self.model.as_ref().expect("it was made").clone_ref(py))
     }

@@ -120,7 +120,7 @@ fn read_group<T: Real>(
     i: usize,
     parts: &mut [Part<'_>],
 ) {
-    if parts.iter().any(|part| part.quantity == Quantity::Sensors) {
+    if parts.iter().any(|part| part.quantity.is_dynamic()) {
         sim.forward(work, group);
     } else if parts.iter().any(|part| part.quantity.is_frame()) {
         sim.refresh(work, group);
@@ -242,6 +242,26 @@ impl<T: Real> Kernel<T> for Read<'_, T> {
             Quantity::NormalForce => {
                 for g in 0..geoms {
                     rows.put(g, felt.normal_force[g]);
+                }
+            }
+            Quantity::Act => {
+                for i in 0..r.group.act.len() {
+                    rows.put(i, r.group.act[i]);
+                }
+            }
+            Quantity::Qacc => {
+                for i in 0..r.group.qvel.len() {
+                    rows.put(i, r.qacc(i));
+                }
+            }
+            Quantity::QfrcConstraint => {
+                for (i, force) in r.constraint_forces().into_iter().enumerate() {
+                    rows.put(i, force);
+                }
+            }
+            Quantity::ActuatorForce => {
+                for i in 0..r.group.ctrl.len() {
+                    rows.put(i, r.actuator_force(i));
                 }
             }
             // evaluated outside this kernel, with a kernel per sensor

@@ -1,8 +1,8 @@
 //! The agents of a batch in lanes of one width.
 
-use super::BodyReading;
 use super::pool::Helpers;
 use super::quantity::{Felt, Quantity};
+use super::{BodyReading, ContactReading};
 use crate::lanes::Real;
 use crate::readings::Readings;
 use crate::sim::Sim;
@@ -19,6 +19,8 @@ pub(super) trait Lanes: Send {
     fn read(&self, agent: usize) -> (Vec<f64>, Vec<f64>);
     fn bodies(&mut self, agent: usize) -> Vec<BodyReading>;
     fn sensors(&mut self, agent: usize) -> Vec<f64>;
+    fn contacts(&mut self, agent: usize) -> Vec<ContactReading>;
+    fn set_act(&mut self, agent: usize, act: &[f64]);
     fn gather(&mut self, wanted: &mut [(Quantity, &mut [f64])]);
     fn ground_height(&mut self, grounds: &[usize], places: &[[f64; 2]], each: usize, heights: &mut [f64]);
     fn save(&self, agent: usize) -> AgentState;
@@ -67,6 +69,13 @@ impl<T: Real> Lanes for LaneBatch<T> {
         let (g, lane) = Self::slot(agent);
         for (u, x) in self.groups[g].ctrl.iter_mut().zip(ctrl) {
             u.set(lane, T::scalar(*x));
+        }
+    }
+
+    fn set_act(&mut self, agent: usize, act: &[f64]) {
+        let (g, lane) = Self::slot(agent);
+        for (a, x) in self.groups[g].act.iter_mut().zip(act) {
+            a.set(lane, T::scalar(*x));
         }
     }
 
@@ -136,6 +145,13 @@ impl<T: Real> Lanes for LaneBatch<T> {
             }
         }
         out
+    }
+
+    fn contacts(&mut self, agent: usize) -> Vec<ContactReading> {
+        let (g, lane) = Self::slot(agent);
+        let (group, work) = (&self.groups[g], &mut self.works[0]);
+        self.sim.forward(work, group);
+        Readings::new(&self.sim, group, work).contacts(lane)
     }
 
     fn gather(&mut self, wanted: &mut [(Quantity, &mut [f64])]) {

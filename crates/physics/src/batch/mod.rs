@@ -180,6 +180,25 @@ impl Batch {
         self.inner.sensors(agent)
     }
 
+    /// Contacts of an agent at its current state and controls, and their forces.
+    ///
+    /// # Panics
+    /// If the agent does not exist.
+    pub fn contacts(&mut self, agent: usize) -> Vec<ContactReading> {
+        assert!(agent < self.agents, "agent {agent} of {}", self.agents);
+        self.inner.contacts(agent)
+    }
+
+    /// Sets the activations of an agent's actuators.
+    ///
+    /// # Panics
+    /// If the agent does not exist, or there are not `na` activations.
+    pub fn set_act(&mut self, agent: usize, act: &[f64]) {
+        assert!(agent < self.agents, "agent {agent} of {}", self.agents);
+        assert_eq!(act.len(), self.model.na, "an activation for each actuator that has one");
+        self.inner.set_act(agent, act);
+    }
+
     /// An exact copy of all agents' states.
     pub fn snapshot(&self) -> Snapshot {
         Snapshot { agents: (0..self.agents).map(|a| self.inner.save(a)).collect() }
@@ -273,6 +292,21 @@ impl Batch {
     pub fn stats(&self) -> SolverStats {
         self.inner.stats()
     }
+}
+
+/// A contact in world axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactReading {
+    /// Geoms, in the order of the model.
+    pub geoms: [usize; 2],
+    /// Place of the contact, m.
+    pub pos: [f64; 3],
+    /// Direction from the first geom to the second.
+    pub normal: [f64; 3],
+    /// Force on the second geom, N.
+    pub force: [f64; 3],
+    /// Torque on it about the contact, N m: from contacts that resist twisting or rolling.
+    pub torque: [f64; 3],
 }
 
 /// Pose and motion of a body in world axes.

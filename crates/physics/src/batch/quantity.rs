@@ -35,6 +35,14 @@ pub enum Quantity {
     NormalForce,
     /// Sensors as in [`Batch::sensors`](super::Batch::sensors), in the model's order.
     Sensors,
+    /// Activations of the actuators that have one, `[na]`.
+    Act,
+    /// Acceleration at the present state and controls, `[nv]`.
+    Qacc,
+    /// Forces of contacts, limits, dry friction and equalities on the joints, N or N m, `[nv]`.
+    QfrcConstraint,
+    /// Forces of the actuators, N or N m, `[nu]`.
+    ActuatorForce,
 }
 
 impl Quantity {
@@ -48,7 +56,15 @@ impl Quantity {
             Quantity::GeomPos | Quantity::GeomVelocity => 3 * model.geoms.len(),
             Quantity::Touching | Quantity::Touched | Quantity::NormalForce => model.geoms.len(),
             Quantity::Sensors => model.sensors.iter().map(|s| s.dim).sum(),
+            Quantity::Act => model.na,
+            Quantity::Qacc | Quantity::QfrcConstraint => model.nv,
+            Quantity::ActuatorForce => model.nu,
         }
+    }
+
+    /// Whether it needs the dynamics of the current state and controls.
+    pub(super) fn is_dynamic(self) -> bool {
+        matches!(self, Quantity::Sensors | Quantity::Qacc | Quantity::QfrcConstraint | Quantity::ActuatorForce)
     }
 
     /// Whether it needs the frames of the current state.

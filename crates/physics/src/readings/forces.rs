@@ -2,6 +2,7 @@
 
 use super::Readings;
 use crate::algebra::spatial::*;
+use crate::batch::ContactReading;
 use crate::lanes::Real;
 use crate::model::EqualityKind;
 use crate::rows::FloorRow;
@@ -75,6 +76,22 @@ impl<T: Real> Readings<'_, T> {
             }
         }
         out
+    }
+
+    /// The contacts of one lane, in world axes and MuJoCo's order of the geoms.
+    pub(crate) fn contacts(&self, lane: usize) -> Vec<ContactReading> {
+        let get = |v: &V3<T>| v.map(|x| T::widen(x.get(lane)));
+        let has = |c: &ContactForce<T>| T::bits(c.on) >> lane & 1 == 1;
+        let read = |c: ContactForce<T>| {
+            let pos = get(&add3(&c.point, &self.work.motion.reference[c.tree]));
+            let (normal, force, torque) = (get(&c.normal), get(&c.force), get(&c.torque));
+            if c.natural {
+                return ContactReading { geoms: c.geoms, pos, normal, force, torque };
+            }
+            let [normal, force, torque] = [normal, force, torque].map(|v| v.map(|x| -x));
+            ContactReading { geoms: [c.geoms[1], c.geoms[0]], pos, normal, force, torque }
+        };
+        self.contact_forces().into_iter().filter(has).map(read).collect()
     }
 
     /// A contact with a level floor.
