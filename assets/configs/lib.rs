@@ -13,6 +13,7 @@
 pub const FILES: &[(&str, &[u8])] = marathon_assets::files![
     "ant-fast.yaml",
     "ant_controller-fast.yaml",
+    "ant_controller-recipe.yaml",
     "ant_controller-steady.yaml",
     "controller-adversary.yaml",
     "controller-fast.yaml",
@@ -21,12 +22,15 @@ pub const FILES: &[(&str, &[u8])] = marathon_assets::files![
     "gymnasium-fast.yaml",
     "hopper-fast.yaml",
     "hopper-mlagents.yaml",
+    "hopper_controller-recipe.yaml",
     "humanoid-fast.yaml",
     "in_style-fast.yaml",
     "marathon_man-fast.yaml",
     "marathon_man_controller-fast.yaml",
+    "marathon_man_controller-recipe.yaml",
     "marathon_man_controller-steady.yaml",
     "marathon_man_steer-fast.yaml",
+    "marathon_man_steer-recipe.yaml",
     "marathon_man_steer-steady.yaml",
     "marathon_man_terrain-fast.yaml",
     "paper-appendix-b.yaml",
@@ -35,6 +39,7 @@ pub const FILES: &[(&str, &[u8])] = marathon_assets::files![
     "terrain-adversary.yaml",
     "terrain-fast.yaml",
     "walker2d-fast.yaml",
+    "walker_controller-recipe.yaml",
 ];
 
 /// The text of a configuration. In a constant, a name that does not exist is an error of the compiler.

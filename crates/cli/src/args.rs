@@ -17,6 +17,7 @@ Examples:
   marathon train hopper --algo sac                 use another algorithm: ppo, a2c, acktr or sac
   marathon train MarathonMan --option clip=my.bvh  imitate a recording
   marathon train --resume runs/hopper-1 --steps 20M    continue a run
+  marathon train WalkerController                  run all stages of a recipe; the same command resumes it
   marathon render runs/hopper-1 --out hop.gif      record a video
   marathon eval runs/hopper-1 --episodes 1000      measure a policy
   marathon export runs/hopper-1                    write an ONNX file
@@ -112,14 +113,19 @@ The run's folder holds:
   policies/               policies saved during training
 
 Ctrl-C finishes the iteration, writes everything and prints the command that resumes; the exit code is then 130. \
-A resumed run gives the same policy, bit for bit, as an uninterrupted one.";
+A resumed run gives the same policy, bit for bit, as an uninterrupted one.
+
+Some tasks have a recipe: several stages, such as other tasks, distillation and averages. `marathon train TASK` runs it, unless \
+an option of a single run is given (--config, --algo, --set, --steps, --agents, --option, --processes or --initialize-from). \
+`marathon train FILE.yaml` runs a file with stages. A recipe's folder is runs/TASK or runs/FILE unless --out names another; it \
+has a folder for each stage. The same command resumes it.";
 
 /// Options of `train`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = TRAIN_HELP)]
 pub struct TrainArgs {
-    /// Task to train, such as hopper, walker, ant, humanoid or Hopper-v5; see `marathon list`.
-    #[arg(required_unless_present = "resume")]
+    /// Task to train, such as hopper, walker, ant, humanoid or Hopper-v5; see `marathon list`. Or a file with stages, .yaml.
+    #[arg(value_name = "TASK", required_unless_present = "resume")]
     pub agent: Option<String>,
     #[command(flatten)]
     pub run: RunOptions,
@@ -129,6 +135,13 @@ pub struct TrainArgs {
     /// Record no video.
     #[arg(long)]
     pub no_video: bool,
+    /// Print the stages of the recipe with their states and commands; train nothing.
+    #[arg(long)]
+    pub list_stages: bool,
+    /// Stage of the recipe to make again if it has changed, with all stages that use it; discards their results. May be
+    /// repeated.
+    #[arg(long, value_name = "STAGE")]
+    pub redo: Vec<String>,
 }
 
 /// Subcommands of `config`.

@@ -4,7 +4,8 @@ use super::document::{Field, Map, Node, Value as Yaml};
 use super::error::{ConfigError, Place, shown};
 use super::keys::{self, Kind, MOST_STEPS};
 use super::section::{Entry, Range, Section};
-use super::{document, names};
+use super::{document, names, stage_keys};
+use marathon_envs::options::Value as Argument;
 use marathon_physics::hint::{did_you_mean, nearest};
 use serde_json::{Map as Object, Value, json};
 use std::collections::BTreeMap;
@@ -15,6 +16,8 @@ pub const OPTIONS: &str = "options";
 const ROLES: &str = "roles";
 const TASKS: &str = "tasks";
 const PRESET: &str = "preset";
+pub const STAGES: &str = "stages";
+pub const TASK: &str = "task";
 /// Most levels of a key.
 const MOST_LEVELS: usize = 8;
 /// Section of ML-Agents' files, which a misspelled key may mean.
@@ -111,6 +114,7 @@ impl File {
 enum Part {
     File,
     Task,
+    Stage,
     Role,
 }
 
@@ -118,10 +122,13 @@ enum Part {
 fn names(part: Part) -> Vec<&'static str> {
     let mut names = keys::names_in("", part == Part::Role);
     names.extend(match part {
-        Part::File => &[OPTIONS, ROLES, TASKS, PRESET][..],
-        Part::Task => &[OPTIONS, ROLES],
+        Part::File => &[OPTIONS, ROLES, TASKS, PRESET, TASK, STAGES][..],
+        Part::Task | Part::Stage => &[OPTIONS, ROLES],
         Part::Role => &[],
     });
+    if part == Part::Stage {
+        names.extend(stage_keys::of_kind("train"));
+    }
     names
 }
 
@@ -153,6 +160,14 @@ impl Layer {
         Self::read(&Section::root(path, &map), Part::Task)
     }
 
+    /// The settings of a stage that trains.
+    ///
+    /// # Errors
+    /// As [`File::read`].
+    pub fn of_stage(section: &Section<'_>) -> Result<Self, ConfigError> {
+        Self::read(section, Part::Stage)
+    }
+
     fn read(section: &Section<'_>, part: Part) -> Result<Self, ConfigError> {
         let mut layer = Layer::default();
         layer.values = layer.section(section, "", part)?;
@@ -177,7 +192,8 @@ impl Layer {
                 return Err(unknown(entry, &known, path, part));
             }
             let value = match entry.key {
-                TASKS | PRESET if path.is_empty() => continue,
+                TASKS | PRESET | STAGES | TASK if path.is_empty() => continue,
+                key if path.is_empty() && part == Part::Stage && stage_keys::find(key).is_some() => continue,
                 OPTIONS if path.is_empty() => options(&section.section(OPTIONS)?)?,
                 ROLES if path.is_empty() => self.roles(&section.section(ROLES)?)?,
                 _ => match keys::find(&inner) {
@@ -292,6 +308,28 @@ fn options(section: &Section<'_>) -> Result<Value, ConfigError> {
         Ok((entry.key.to_string(), Value::String(text)))
     };
     section.entries().map(read).collect::<Result<_, _>>().map(Value::Object)
+}
+
+/// The options of a section, as the task takes them.
+///
+/// # Errors
+/// If a value cannot be an option.
+pub fn options_of(section: &Section<'_>) -> Result<Vec<(String, Argument)>, ConfigError> {
+    let Value::Object(found) = options(&section.section(OPTIONS)?)? else { return Ok(Vec::new()) };
+    Ok(found.iter().map(|(name, value)| (name.clone(), argument(value))).collect())
+}
+
+/// An option of a task in a layer.
+pub fn argument(value: &Value) -> Argument {
+    value.as_str().unwrap_or_default().parse().unwrap_or_else(|never| match never {})
+}
+
+/// The value of a key of a stage.
+///
+/// # Errors
+/// If it is of the wrong kind.
+pub fn stage_value(section: &Section<'_>, entry: &Entry<'_>) -> Result<Value, ConfigError> {
+    stage_keys::find(entry.key).map_or(Ok(Value::Null), |key| value(section, entry, key.kind))
 }
 
 /// A value of a kind.

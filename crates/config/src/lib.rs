@@ -7,7 +7,7 @@
 //!
 //! The way of a file: `document` makes a tree of the YAML text. `layer` reads a file of Marathon's by the table of `keys`, and
 //! `loaded` puts it over what `presets` has for the task. `mlagents` reads the other files. `section` is what both read
-//! values with.
+//! values with. `recipe` reads files with stages.
 //!
 //! `docs/reference/configs.md` has the tables of all keys.
 
@@ -20,8 +20,10 @@ mod mlagents;
 mod names;
 mod parse;
 mod presets;
+pub mod recipe;
 mod reference;
 mod section;
+mod stage_keys;
 mod yaml;
 
 pub use error::{ConfigError, Place};
@@ -29,5 +31,6 @@ pub use keys::all as keys;
 pub use loaded::{Loaded, default_of};
 pub use parse::{convert, parse, parse_object, set};
 pub use presets::{against, default_for};
+pub use recipe::{Recipe, recipe_for, shipped};
 pub use reference::reference;
 pub use section::steps;

@@ -1,7 +1,7 @@
 //! Result of loading a configuration: the settings of the trainer and of the run.
 
 use super::error::ConfigError;
-use super::layer::{Layer, OPTIONS, overlay};
+use super::layer::{Layer, OPTIONS, argument, overlay};
 use super::{keys, yaml};
 use marathon_envs::options::Value;
 use marathon_learn::{Error, TrainConfig};
@@ -98,8 +98,7 @@ impl Loaded {
         self.keep_checkpoints = number("keep_checkpoints") as usize;
         for (name, value) in options {
             self.options.retain(|(known, _)| *known != name);
-            let text = value.as_str().unwrap_or_default();
-            self.options.push((name, text.parse().unwrap_or_else(|never| match never {})));
+            self.options.push((name, argument(&value)));
         }
         Ok(self)
     }
@@ -132,6 +131,11 @@ impl Loaded {
         let mut all = differences(&self.document(), &default_of(algorithm).document());
         all.entry(algorithm).or_insert_with(|| Object::new().into());
         all
+    }
+
+    /// The settings that differ from those of another configuration.
+    pub fn differences_from(&self, other: &Loaded) -> Object<String, Json> {
+        differences(&self.document(), &other.document())
     }
 
     /// All settings as a file in YAML.

@@ -2,7 +2,7 @@
 
 use super::document::{self, Map};
 use super::error::{ConfigError, Place, shown};
-use super::layer::{File, Layer};
+use super::layer::{File, Layer, STAGES, TASK};
 use super::loaded::{Loaded, to_yaml};
 use super::mlagents;
 use super::names;
@@ -39,6 +39,11 @@ fn read(path: &Path, map: &Map, task: &str) -> Result<Loaded, ConfigError> {
         return mlagents::read(path, map, &task);
     }
     let file = File::read(path, map)?;
+    if let Some(field) = map.get(STAGES).or(map.get(TASK)) {
+        let place = Place { file: path.into(), line: field.line, key: field.key.clone() };
+        let expected = format!("settings of one run; `marathon train {}` runs a file with stages", path.display());
+        return Err(ConfigError::value(place, format!("'{}'", field.key), expected));
+    }
     file.check_tasks(&task)?;
     let (layer, note) = file.of_task(&task);
     let base = if file.preset { default_for(&task) } else { Loaded::default() };

@@ -2,6 +2,7 @@
 
 use super::keys::{ALGORITHMS, KEYS, Key, REWARDS};
 use super::loaded::default_of;
+use super::stage_keys::STAGE_KEYS;
 use super::yaml;
 use marathon_learn::{Form, Imitation, Novelty, RewardConfig, RewardKind};
 use serde_json::{Map, Value};
@@ -27,6 +28,10 @@ const GROUPS: [(&str, &str, &[&str]); 6] = [
     ("The file itself", "", &[""]),
 ];
 
+/// Text above the table of stages.
+const ABOUT_STAGES: &str = "Keys of a stage of a [recipe](#recipes). A stage has one of three kinds: it trains, distills (`distill`) or averages (`average`). The \
+    meaning begins with the kinds that have the key. A stage that trains also has the keys above, and every stage has `options`.";
+
 /// Tables of all keys.
 pub fn reference() -> String {
     let mut text = String::new();
@@ -49,6 +54,31 @@ pub fn reference() -> String {
         }
         text.push('\n');
     }
+    text + &stages()
+}
+
+/// Table of the keys of stages.
+fn stages() -> String {
+    let mut text =
+        format!("### `stages`\n\n{ABOUT_STAGES}\n\n| key | default | value | meaning |\n|---|---|---|---|\n");
+    for Key { sections, name, kind, about } in STAGE_KEYS {
+        let default = match *name {
+            "task" => "that of the file",
+            "seed" => "1",
+            "episodes" => "100",
+            "or_fail" => "false",
+            "steps" | "hidden" | "agents" | "lr" if sections.contains(&"distill") => "as of the command",
+            _ => "none",
+        };
+        let value = match *name {
+            "seeds" => "a list of whole numbers".into(),
+            "distill" | "average" => "a list of stages or files".into(),
+            _ => kind.text(),
+        };
+        let kinds: Vec<String> = sections.iter().map(|kind| format!("`{kind}`")).collect();
+        let _ = writeln!(text, "| `{name}` | {default} | {value} | {}: {about} |", kinds.join(", "));
+    }
+    text.push('\n');
     text
 }
 

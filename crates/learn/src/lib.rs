@@ -79,7 +79,7 @@ pub use nets::gaussian::Ratio;
 pub use nets::init::Init;
 pub use nets::normalize::Normalizer;
 pub use policy::evaluation::Evaluation;
-pub use policy::{BlockPolicy, Cast, Policy, PolicyMeta, Training};
+pub use policy::{Ancestor, BlockPolicy, Cast, Policy, PolicyMeta, Training};
 pub use rewards::discriminator::{Form, Imitation};
 pub use rewards::{Novelty, RewardConfig, RewardKind};
 pub use rollout::statistics::StatisticsConfig;

@@ -15,16 +15,35 @@ use std::path::Path;
 /// If the file cannot be read, or is not a configuration for the agent; see [`parse`].
 pub fn load(path: &Path, agent: &str) -> Result<Loaded, RunError> {
     let loaded = parse(path, &read(path)?, agent)?;
-    // tasks of a front end are not registered and take no options
-    if let Ok(agent) = registry::agent(agent) {
-        let known: Vec<&str> = agent.options().iter().map(|option| option.name).collect();
-        if let Some((name, value)) = loaded.options.iter().find(|(name, _)| !known.contains(&name.as_str())) {
-            let near = did_you_mean(nearest(name, known.iter().copied()));
-            let expected = format!("an option of {}: {}{near}", agent.facts().id, known.join(", "));
-            return Err(RunError::file(path, format!("options.{name}"), value, expected));
-        }
-    }
+    check_options(path, "options", agent, &loaded.options)?;
     Ok(loaded)
+}
+
+/// Refuses options that a task does not take. `section`: where the file has them.
+///
+/// # Errors
+/// Names the option and the nearest.
+pub(crate) fn check_options(
+    path: &Path,
+    section: &str,
+    agent: &str,
+    options: &[(String, Value)],
+) -> Result<(), RunError> {
+    // tasks of a front end are not registered and take no options
+    let Ok(agent) = registry::agent(agent) else { return Ok(()) };
+    let known: Vec<&str> = agent.options().iter().map(|option| option.name).collect();
+    match options.iter().find(|(name, _)| !known.contains(&name.as_str())) {
+        Some((name, value)) => {
+            let near = did_you_mean(nearest(name, known.iter().copied()));
+            let id = agent.facts().id;
+            let expected = match known.is_empty() {
+                true => format!("no option, because {id} has none"),
+                false => format!("an option of {id}: {}{near}", known.join(", ")),
+            };
+            Err(RunError::file(path, format!("{section}.{name}"), value, expected))
+        }
+        None => Ok(()),
+    }
 }
 
 /// The configuration of a new run: that of a file, the settings that an algorithm starts from, or the preset of the task; with

@@ -117,6 +117,19 @@ pub enum RunError {
     Process(String),
     /// The system does not report Ctrl-C.
     Signal(String),
+    /// A stage of a recipe is not what it was when its results were made.
+    StageChanged {
+        /// Name of the stage.
+        stage: String,
+        /// Its folder.
+        folder: PathBuf,
+        /// The first place that differs.
+        place: String,
+        /// The value that it was made with.
+        made: String,
+        /// The value now.
+        now: String,
+    },
     /// Training stopped because its results could no longer be written.
     Stopped {
         /// The first failure.
@@ -198,6 +211,13 @@ impl RunError {
                 path_word(path)
             ),
             RunError::Process(text) | RunError::Signal(text) => text.clone(),
+            RunError::StageChanged { stage, folder, place, made, now } => format!(
+                "{}: {place}: found {now}, expected {made}, which the stage '{stage}' was made with; {} discards its results \
+                 and makes it again, {} starts in another folder",
+                folder.display(),
+                spelling.with_value("redo", stage),
+                spelling.with_value("out", "DIR")
+            ),
             RunError::Stopped { cause, folder, steps, saved } => {
                 let (done, resume) = (thousands(*steps), spelling.resume(folder));
                 let advice = match saved {

@@ -15,6 +15,8 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 const RUN: &str = "run.json";
+/// Description of a recipe's folder.
+pub(crate) const RECIPE: &str = "recipe.json";
 const LOCK: &str = ".lock";
 const PROGRESS: &str = "progress.csv";
 /// Folder of the checkpoint.
@@ -22,7 +24,7 @@ const CHECKPOINT: &str = "checkpoint";
 /// Folder of policies from during the run.
 pub const POLICIES: &str = "policies";
 /// Default folder of runs.
-const RUNS: &str = "runs";
+pub(crate) const RUNS: &str = "runs";
 /// Part of the name of every file that TensorBoard reads.
 pub const EVENTS: &str = "events.out.tfevents";
 
@@ -79,24 +81,8 @@ impl RunFolder {
     }
 
     fn lock(path: PathBuf) -> Result<Self, RunError> {
-        let name = path.join(LOCK);
-        refuse_link(&name)?;
-        let mut options = File::options();
-        options.read(true).write(true).create(true).truncate(false);
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::OpenOptionsExt;
-            // refuses a link that was created a moment ago, or a pipe without a reader
-            options.custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK);
-        }
-        let lock = options.open(&name).map_err(RunError::io(&path, "write to folder"))?;
-        match lock.try_lock() {
-            Err(TryLockError::WouldBlock) => {
-                Err(RunError::file(&path, "run", "another process that is writing to it", "no other"))
-            }
-            // some network file systems have no locks: then no other process can have one
-            Ok(()) | Err(TryLockError::Error(_)) => Ok(Self { path, made: None, _lock: lock }),
-        }
+        let lock = lock(&path)?;
+        Ok(Self { path, made: None, _lock: lock })
     }
 
     /// Reads the last checkpoint of a run. A run that ended before its first checkpoint has none.
@@ -276,8 +262,33 @@ impl RunFolder {
     }
 }
 
+/// Locks a folder against other processes that write to it, while the file lives.
+///
+/// # Errors
+/// If another process has locked it, or the lock cannot be written.
+pub(crate) fn lock(path: &Path) -> Result<File, RunError> {
+    let name = path.join(LOCK);
+    refuse_link(&name)?;
+    let mut options = File::options();
+    options.read(true).write(true).create(true).truncate(false);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::OpenOptionsExt;
+        // refuses a link that was created a moment ago, or a pipe without a reader
+        options.custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK);
+    }
+    let lock = options.open(&name).map_err(RunError::io(path, "write to folder"))?;
+    match lock.try_lock() {
+        Err(TryLockError::WouldBlock) => {
+            Err(RunError::file(path, "run", "another process that is writing to it", "no other"))
+        }
+        // some network file systems have no locks: then no other process can have one
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(lock),
+    }
+}
+
 /// Refuses a name that something other than a folder has.
-fn refuse_file(out: &Path) -> Result<(), RunError> {
+pub(crate) fn refuse_file(out: &Path) -> Result<(), RunError> {
     let Ok(facts) = fs::symlink_metadata(out) else { return Ok(()) };
     if out.is_dir() {
         return Ok(());
@@ -311,7 +322,8 @@ fn refuse(out: &Path) -> Result<(), RunError> {
 /// Whether the program writes an entry of this name to a run's folder, and whether the entry is a folder.
 fn kind_of_entry(name: &OsStr) -> Option<bool> {
     let name = name.to_str()?;
-    let files = [LOCK, RUN, PROGRESS, "policy.safetensors", "summary.json", "curve.png"];
+    let files =
+        [LOCK, RUN, PROGRESS, "policy.safetensors", "summary.json", "curve.png", "stage.json", "until.json", "done"];
     let starts = ["policy-", EVENTS].iter().any(|start| name.starts_with(start));
     let ends = [".motion", ".gif"].iter().any(|end| name.ends_with(end));
     match name {

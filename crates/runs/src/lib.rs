@@ -19,6 +19,8 @@ pub mod error;
 pub mod folder;
 pub mod imitation;
 pub mod inputs;
+#[cfg(feature = "training")]
+pub mod measure;
 pub mod options;
 pub mod output;
 pub mod play;
@@ -26,6 +28,8 @@ pub mod policy_file;
 #[cfg(feature = "training")]
 pub mod processes;
 pub mod python;
+#[cfg(feature = "training")]
+pub mod recipe;
 #[cfg(feature = "training")]
 pub mod report;
 pub mod run_file;

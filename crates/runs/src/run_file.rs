@@ -128,7 +128,11 @@ pub fn difference_of_runs(found: &RunFile, expected: &RunFile) -> Option<(String
 }
 
 /// The first place where two documents differ, with both values.
-fn difference<'v>(place: &str, found: &'v Value, expected: &'v Value) -> Option<(String, &'v Value, &'v Value)> {
+pub(crate) fn difference<'v>(
+    place: &str,
+    found: &'v Value,
+    expected: &'v Value,
+) -> Option<(String, &'v Value, &'v Value)> {
     match (found, expected) {
         (Value::Object(keys), Value::Object(_)) => {
             keys.iter().find_map(|(key, found)| difference(&format!("{place}.{key}"), found, &expected[key.as_str()]))

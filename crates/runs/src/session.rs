@@ -15,7 +15,7 @@ use crate::report::{Reporter, Watch, curve, save, save_policies};
 use crate::run_file::RunFile;
 use crate::task::Task;
 use crate::task_config::{TaskConfig, TaskOptions};
-use crate::text::{thousands, whole};
+use crate::text::{counted, thousands, whole};
 use marathon_config::Loaded;
 use marathon_envs::ShardFactory;
 use marathon_learn::{
@@ -186,6 +186,29 @@ impl Session {
     /// Number of agent-steps done before.
     pub fn steps(&self) -> u64 {
         self.checkpoint.as_ref().map_or(0, Checkpoint::steps)
+    }
+
+    /// Lines that say what will be trained, for the user.
+    pub fn announcement(&self) -> Vec<String> {
+        let (run, done) = (&self.run, self.steps());
+        let config = &run.config;
+        let (verb, from) = match done {
+            0 => ("training", String::new()),
+            _ => ("going on with", format!(" from step {}", thousands(done))),
+        };
+        let findings = self.task_config.findings().unwrap_or_default();
+        let mut lines: Vec<String> = findings.lines().map(String::from).collect();
+        lines.push(format!(
+            "{verb} {}{from} to {}: {}, {}, {}, seed {}; results in {}",
+            run.agent,
+            thousands(config.run.total_steps),
+            counted(config.run.agents, "agent"),
+            counted(config.run.worker_count(), "thread"),
+            Isa::best().name(),
+            config.run.seed,
+            self.folder.as_ref().map(|folder| folder.path().display().to_string()).unwrap_or_default()
+        ));
+        lines
     }
 
     /// Removes the folder of a run that could not start, unless there was a run before.

@@ -1,5 +1,6 @@
 //! Formatting of numbers and paths.
 
+use marathon_learn::Ancestor;
 use serde::Serializer;
 use std::borrow::Cow;
 use std::path::{Component, Path, PathBuf};
@@ -47,6 +48,15 @@ pub fn duration(seconds: f64) -> String {
         60..3600 => format!("{} min {:02} s", whole / 60, whole % 60),
         _ => format!("{} h {:02} min", whole / 3600, whole % 3600 / 60),
     }
+}
+
+/// A stage that a policy comes from: `steady: train WalkerController-v0, seed 2, 40,000,000 steps, from follows`.
+pub fn ancestor(of: &Ancestor) -> String {
+    let Ancestor { stage, kind, agent, seed, steps, from, .. } = of;
+    let seed = seed.map_or(String::new(), |seed| format!(", seed {seed}"));
+    let steps = if *steps == 0 { String::new() } else { format!(", {} steps", thousands(*steps)) };
+    let from = if from.is_empty() { String::new() } else { format!(", from {}", from.join(", ")) };
+    format!("{stage}: {kind} {agent}{seed}{steps}{from}")
 }
 
 /// A note on agents whose state became non-finite. `None` if there were none.

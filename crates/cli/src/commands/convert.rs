@@ -4,7 +4,7 @@ use crate::args::{ExportArgs, ImportArgs};
 use crate::error::CliError;
 use marathon_learn::Policy;
 use marathon_runs::terminal::{print_json, say};
-use marathon_runs::text::path_word;
+use marathon_runs::text::{ancestor, path_word};
 use marathon_runs::{TaskOptions, output, policy_file};
 use std::path::Path;
 
@@ -59,11 +59,12 @@ pub fn tell(policy: &Policy, out: &Path, json: bool) {
     if json {
         print_json(&serde_json::json!({
             "out": out.to_string_lossy(), "agent": meta.agent, "observation": meta.obs, "action": meta.act, "hidden": meta.hidden,
-            "activation": meta.activation,
+            "activation": meta.activation, "lineage": meta.lineage,
         }));
     } else {
         let layers: Vec<String> = meta.hidden.iter().map(|n| n.to_string()).collect();
         let network = format!("{} -> {} -> {}", meta.obs, layers.join(" -> "), meta.act).replace(">  ->", ">");
         say(format!("wrote {}: {}, {network}, {}", path_word(out), meta.agent, meta.activation.name()));
+        meta.lineage.iter().for_each(|stage| say(format!("  stage {}", ancestor(stage))));
     }
 }

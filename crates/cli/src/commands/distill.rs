@@ -6,14 +6,11 @@ use crate::program;
 use cpu_time::ProcessTime;
 use marathon_learn::Control;
 use marathon_runs::distill::{Distilled, resumable};
-use marathon_runs::report::progress::bar;
+use marathon_runs::report::progress::Rounds;
 use marathon_runs::terminal::{interrupt, note, print_json, say};
 use marathon_runs::{TaskConfig, output, policy_file, text};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-
-/// Decisions between two lines without a terminal.
-const EVERY: u64 = 1_000_000;
 
 /// Output of `--json`.
 #[derive(Serialize)]
@@ -53,23 +50,14 @@ pub fn run(args: &DistillArgs, json: bool) -> Result<(), CliError> {
         text::thousands(options.steps),
         options.seed
     ));
-    let (progress, mut due, mut last) = (bar(options.steps), EVERY, None);
+    let (mut progress, mut last) = (Rounds::new(options.steps), None);
     let start = ProcessTime::try_now().ok();
     let policy = resumable(task, &args.teachers, options, Some(&notes), &mut |now: &Distilled| {
         last = Some(*now);
-        let line = format!("loss {:.5}  failures {:.3} % of decisions", now.loss, 100.0 * now.failures);
-        if let Some(bar) = &progress {
-            bar.set_position(now.steps);
-            bar.set_message(line);
-        } else if now.steps >= due {
-            due += EVERY;
-            note(format!("{:>12} of {} decisions  {line}", text::thousands(now.steps), text::thousands(options.steps)));
-        }
+        progress.update(now.steps, now.loss, now.failures);
         if interrupt::requested() { Control::Stop } else { Control::Continue }
     })?;
-    if let Some(bar) = &progress {
-        bar.finish_and_clear();
-    }
+    progress.finish();
     let cpu_seconds = start.map_or(0.0, |start| start.elapsed().as_secs_f64());
     policy_file::save(&policy, &args.out)?;
     let Distilled { steps, loss, failures } = last.unwrap_or(Distilled { steps: 0, loss: 0.0, failures: 0.0 });

@@ -6,7 +6,7 @@ use marathon_learn::{EvalOptions, Evaluation, Policy, evaluate_roles};
 use marathon_physics::lanes::Isa;
 use marathon_runs::report::summary;
 use marathon_runs::terminal::{self, print_json, say};
-use marathon_runs::{Imitation, imitation};
+use marathon_runs::{Imitation, imitation, text};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -39,6 +39,7 @@ pub fn run(args: &EvalArgs, json: bool) -> Result<(), CliError> {
         print_json(&Report { eval: &results[0], roles: roles.collect(), imitation: &imitation });
     } else {
         say(format!("{} ({})", spec.id, args.source.policy.display()));
+        policies[0].meta().lineage.iter().for_each(|stage| say(format!("  stage     {}", text::ancestor(stage))));
         say(summary::evaluation_table(&results[0], spec.max_episode_steps, spec.dt));
         for (name, Evaluation { return_mean, return_std, .. }) in roles {
             say(format!("  {name:<9} return {return_mean:.1} \u{b1} {return_std:.1}"));

@@ -9,6 +9,7 @@ pub mod doctor;
 pub mod eval;
 pub mod list;
 pub mod play;
+pub mod recipe;
 pub mod record_demo;
 pub mod render;
 pub mod rollout_worker;

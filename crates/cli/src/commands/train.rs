@@ -1,11 +1,10 @@
 //! `marathon train`: from a configuration to a folder with a policy.
 
 use crate::args::TrainArgs;
-use crate::commands::render;
+use crate::commands::{recipe, render};
 use crate::error::CliError;
 use crate::program::{self, resume_command};
 use marathon_learn::{Control, IterationStats, Players};
-use marathon_physics::lanes::Isa;
 use marathon_runs::processes::Processes;
 use marathon_runs::report::summary::{EPISODES, evaluation_table};
 use marathon_runs::terminal::{self, interrupt, print_json, say};
@@ -18,13 +17,16 @@ use std::io::IsTerminal;
 /// If the command line, the configuration or the run to go on with is not usable, or files cannot be written;
 /// [`CliError::Interrupted`] after Ctrl-C.
 pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
+    if let Some(recipe) = recipe::of(args)? {
+        return recipe::run(recipe, args, json);
+    }
     let task = args.agent.as_deref().map(Task::named).transpose()?;
     let (session, notes) = Session::open(task, &args.run, None, false)?;
     terminal::notes(notes);
     let spec = session.factory.spec().clone();
     let (total_steps, agent) = (session.run.config.run.total_steps, session.run.agent.clone());
     interrupt::install("finishing this iteration and writing the results")?;
-    announce(&session);
+    session.announcement().into_iter().for_each(terminal::note);
     let stop = |_: &IterationStats| if interrupt::requested() { Control::Stop } else { Control::Continue };
     let mut processes = match args.run.processes {
         0 => None,
@@ -77,27 +79,4 @@ pub fn run(args: &TrainArgs, json: bool) -> Result<(), CliError> {
         say(format!("watch it:    {program} render {path} --out {name}"));
     }
     Ok(())
-}
-
-fn announce(session: &Session) {
-    let (run, done) = (&session.run, session.steps());
-    let config = &run.config;
-    let folder = session.folder.as_ref().map(|folder| folder.path().display().to_string()).unwrap_or_default();
-    let (verb, from) = match done {
-        0 => ("training", String::new()),
-        _ => ("going on with", format!(" from step {}", text::thousands(done))),
-    };
-    if let Some(findings) = session.task_config.findings() {
-        findings.lines().for_each(terminal::note);
-    }
-    terminal::note(format!(
-        "{verb} {}{from} to {}: {}, {}, {}, seed {}; results in {}",
-        run.agent,
-        text::thousands(config.run.total_steps),
-        text::counted(config.run.agents, "agent"),
-        text::counted(config.run.worker_count(), "thread"),
-        Isa::best().name(),
-        config.run.seed,
-        folder
-    ));
 }

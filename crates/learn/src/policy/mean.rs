@@ -27,6 +27,7 @@ impl Policy {
         sums.iter_mut().for_each(|sum| *sum /= policies.len() as f64);
         let mut mean = last.with_numbers(&sums);
         mean.meta.evaluation = None;
+        mean.meta.lineage = Vec::new();
         Ok(mean)
     }
 

@@ -87,6 +87,9 @@ pub struct PolicyMeta {
     pub training: Option<Training>,
     /// Results of the last evaluation.
     pub evaluation: Option<Evaluation>,
+    /// The stages of the recipe that made the policy, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lineage: Vec<Ancestor>,
 }
 
 impl PolicyMeta {
@@ -110,6 +113,7 @@ impl PolicyMeta {
             action_range: (0..spec.act).map(|i| spec.action_range(i)).collect(),
             training: None,
             evaluation: None,
+            lineage: Vec::new(),
         }
     }
 }
@@ -123,6 +127,27 @@ pub struct Training {
     pub steps: u64,
     /// Rollouts.
     pub iterations: u64,
+}
+
+/// A stage of the recipe that made a policy. Like [`Training`], it has no times.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Ancestor {
+    /// Name of the stage.
+    pub stage: String,
+    /// How the stage made its policy: `train`, `distill` or `average`.
+    pub kind: String,
+    /// Name of its agent with its task.
+    pub agent: String,
+    /// Seed of its run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u64>,
+    /// Agent-steps of its run.
+    pub steps: u64,
+    /// Stages and files that it used.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub from: Vec<String>,
+    /// Checksum of the settings and files that its policy depends on.
+    pub hash: String,
 }
 
 /// A policy that can act.
@@ -184,6 +209,10 @@ impl Policy {
     /// Stores the results of an evaluation.
     pub fn set_evaluation(&mut self, evaluation: Evaluation) {
         self.meta.evaluation = Some(evaluation);
+    }
+    /// Stores the stages that made the policy.
+    pub fn set_lineage(&mut self, lineage: Vec<Ancestor>) {
+        self.meta.lineage = lineage;
     }
     /// Stores the options of the policy's task.
     pub fn set_options(&mut self, options: Options) {

@@ -126,6 +126,47 @@ impl Progress {
     }
 }
 
+/// Shows progress of a distillation: a bar in a terminal, otherwise a line now and then.
+pub struct Rounds {
+    bar: Option<ProgressBar>,
+    total: u64,
+    due: u64,
+}
+
+impl Rounds {
+    /// Decisions between two lines without a terminal.
+    const EVERY: u64 = 1_000_000;
+
+    /// Progress of `total` decisions.
+    pub fn new(total: u64) -> Self {
+        Rounds { bar: bar(total), total, due: Self::EVERY }
+    }
+
+    /// Updates the display after a round. `loss` and `failures` are those of the round.
+    pub fn update(&mut self, steps: u64, loss: f64, failures: f64) {
+        let line = format!("loss {loss:.5}  failures {:.3} % of decisions", 100.0 * failures);
+        match &self.bar {
+            Some(bar) => {
+                bar.set_position(steps);
+                bar.set_message(line);
+            }
+            None if steps >= self.due => {
+                self.due = (steps / Self::EVERY + 1).saturating_mul(Self::EVERY);
+                // stderr may be closed
+                let _ = writeln!(stderr(), "{:>12} of {} decisions  {line}", thousands(steps), thousands(self.total));
+            }
+            None => {}
+        }
+    }
+
+    /// Removes the bar.
+    pub fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
 impl Episodes {
     fn add(&mut self, stats: &IterationStats) {
         let n = stats.episodes as f64;
