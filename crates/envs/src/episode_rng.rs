@@ -42,6 +42,12 @@ impl EpisodeRng {
         random
     }
 
+    /// The random numbers of a seed that an agent has drawn itself, apart from those of all episodes.
+    pub(crate) fn numbered(seed: u64) -> Self {
+        // episodes count from 1
+        EpisodeRng::new(EpisodeId { seed, agent: u64::MAX, episode: 0 })
+    }
+
     /// Uniform in [-half_width, half_width).
     pub fn around_zero(&mut self, half_width: f64) -> f64 {
         (2.0 * self.unit() - 1.0) * half_width

@@ -211,7 +211,7 @@ fn fall_at(env: &mut VecEnv, out: &mut Step, x: &[f64]) {
 
 #[test]
 fn a_curriculum_rises_and_falls_with_the_way() {
-    let mut env = env("TerrainHopper-v0", &[("levels", "curriculum"), ("difficulty", "0.5")], Autoreset::SameStep);
+    let mut env = env("TerrainHopper-v0", &[("levels", "distance"), ("difficulty", "0.5")], Autoreset::SameStep);
     let mut out = env.buffers();
     env.reset(Some(1), &mut out.obs).unwrap();
     assert!(env.ground(3, 0).unwrap().iter().all(|z| *z == 0.0), "it begins with level ground");

@@ -72,16 +72,15 @@ pub enum Study {
         #[arg(long)]
         kept_only: bool,
     },
-    /// Characters that learned on flat, random, increasingly difficult and adversarial ground, with and without seeing
-    /// it, on courses that are new to all of them. Runs are kept in runs/assault-course or --keep, each with a small
+    /// Characters that learned on ground of ten kinds, with and without seeing it, on courses that are new to all of them. Runs are kept in runs/assault-course or --keep, each with a small
     /// file of its results; these files are enough to write the page again.
     AssaultCourse {
         #[command(flatten)]
         options: Options,
-        /// TerrainHopper, TerrainWalker2d, or both separated by a comma [default: both].
+        /// Some of TerrainHopper, TerrainWalker2d, TerrainAnt [default: all].
         #[arg(long, value_name = "TASKS", value_delimiter = ',')]
         tasks: Vec<String>,
-        /// Ground to learn on: some of flat, random, curriculum, adversary, bounded, rising,
+        /// Ground to learn on: some of flat, random, distance, sfl, plr, accel, adversary, bounded, rising,
         /// regret [default: all].
         #[arg(long, value_name = "GROUNDS", value_delimiter = ',')]
         grounds: Vec<String>,
@@ -91,6 +90,12 @@ pub enum Study {
         /// Write the page from the kept runs without training.
         #[arg(long)]
         kept_only: bool,
+        /// Train no adversary against the finished runners.
+        #[arg(long)]
+        no_adversary: bool,
+        /// Fresh random courses of the evaluation; 0 leaves it out.
+        #[arg(long, value_name = "N", default_value_t = crate::assault_course::FRESH)]
+        fresh: usize,
     },
 }
 

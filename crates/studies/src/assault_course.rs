@@ -1,28 +1,29 @@
-//! Assault courses: characters learn on level, random, increasingly difficult and adversarial ground, with and without
-//! seeing it. Their policies are evaluated on courses that are new to all of them.
+//! Assault courses: characters learn on ground that is level, random, increasingly difficult, made of pieces that teach,
+//! or built by an adversary, with and without seeing it. Their policies are evaluated on courses that are new to all of them.
 
 use crate::args::Options;
 use crate::error::StudyError;
+use crate::fresh_courses::{self, Fresh, Outcome};
 use crate::kept;
 use crate::record::Record;
 use crate::statistics::{cell, median};
 use crate::training::EPISODES;
 use marathon_config::{against, default_for};
 use marathon_envs::options::Value;
-use marathon_learn::{EvalOptions, Evaluation, evaluate};
+use marathon_learn::{EvalOptions, Evaluation, Policy, evaluate};
 use marathon_physics::hint::{did_you_mean, nearest};
 use marathon_physics::lanes::Isa;
 use marathon_runs::report::chart::Chart;
 use marathon_runs::terminal::interrupt;
 use marathon_runs::text::thousands;
-use marathon_runs::{PolicySource, RunFile, RunFolder, Summary, TaskOptions};
+use marathon_runs::{PolicySource, RunFile, RunFolder, Summary, TaskConfig, TaskOptions};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Default folder of the kept runs.
 const KEEP: &str = "runs/assault-course";
 /// The characters.
-const TASKS: [&str; 2] = ["TerrainHopper", "TerrainWalker2d"];
+const TASKS: [&str; 3] = ["TerrainHopper", "TerrainWalker2d", "TerrainAnt"];
 
 /// Characters that see the ground, and characters that do not.
 const SIGHTS: [&str; 2] = ["heights", "blind"];
@@ -31,13 +32,16 @@ const SIGHTS: [&str; 2] = ["heights", "blind"];
 type Ground = (&'static str, &'static [(&'static str, &'static str)]);
 
 /// Training grounds.
-const GROUNDS: [Ground; 7] = [
+const GROUNDS: [Ground; 10] = [
     ("flat", &[("course", "flat"), ("levels", "fixed")]),
     ("random", &[("course", "mixed"), ("levels", "random"), ("difficulty", "1")]),
-    ("curriculum", &[("course", "mixed"), ("levels", "curriculum"), ("difficulty", "1")]),
+    ("distance", &[("course", "mixed"), ("levels", "distance"), ("difficulty", "1")]),
+    ("sfl", &[("course", "mixed"), ("levels", "sfl"), ("difficulty", "1")]),
+    ("plr", &[("course", "mixed"), ("levels", "plr"), ("difficulty", "1")]),
+    ("accel", &[("course", "mixed"), ("levels", "accel"), ("difficulty", "1")]),
     ("adversary", &[("course", "adversary"), ("levels", "fixed"), ("difficulty", "1")]),
     ("bounded", &[("course", "adversary"), ("levels", "fixed"), ("difficulty", "0.5")]),
-    ("rising", &[("course", "adversary"), ("levels", "curriculum"), ("difficulty", "1")]),
+    ("rising", &[("course", "adversary"), ("levels", "distance"), ("difficulty", "1")]),
     ("regret", &[("course", "adversary"), ("levels", "fixed"), ("difficulty", "1"), REGRET]),
 ];
 
@@ -55,6 +59,10 @@ const COURSES: [(&str, &str, &str); 5] = [
 
 /// Ground that a character's own adversary may build.
 const ADVERSARY: [(&str, &str); 3] = [("course", "adversary"), ("levels", "fixed"), ("difficulty", "0.5")];
+/// Number of fresh random courses, unless the user sets it.
+pub const FRESH: usize = 1000;
+/// Characters against which an adversary can learn.
+const HAVE_ADVERSARIES: [&str; 2] = ["TerrainHopper", "TerrainWalker2d"];
 /// Decisions of the character for which its own adversary learns.
 const ADVERSARY_STEPS: u64 = 4_000_000;
 
@@ -70,6 +78,9 @@ struct Found {
     cpu_seconds: f64,
     /// The evaluation on each course.
     courses: Vec<Judged>,
+    /// The evaluation on fresh random courses. Older files have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    fresh: Option<Fresh>,
     /// The evaluation on the ground of its own adversary, which learned against the fixed policy. Older files have
     /// none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -95,12 +106,22 @@ impl Judged {
     }
 }
 
-/// Trains and evaluates. `only` names tasks, grounds and sights; an empty list means all. With `kept_only`, uses the
-/// kept runs without training.
+/// How to evaluate the runners.
+#[derive(Clone, Copy)]
+pub struct Evaluations {
+    /// Use the kept runs without training.
+    pub kept_only: bool,
+    /// Train an adversary against each runner.
+    pub adversary: bool,
+    /// Number of fresh random courses.
+    pub fresh: usize,
+}
+
+/// Trains and evaluates. `only` names tasks, grounds and sights; an empty list means all.
 ///
 /// # Errors
 /// If a name is unknown, or a run cannot be trained or read, or has another configuration.
-pub fn run(options: &Options, only: [&[String]; 3], kept_only: bool) -> Result<Record, StudyError> {
+pub fn run(options: &Options, only: [&[String]; 3], evaluations: Evaluations) -> Result<Record, StudyError> {
     let [tasks, grounds, sights] = only;
     let tasks = chosen("--tasks", tasks, &TASKS)?;
     let grounds = chosen("--grounds", grounds, &GROUNDS.map(|(name, _)| name))?;
@@ -115,7 +136,7 @@ pub fn run(options: &Options, only: [&[String]; 3], kept_only: bool) -> Result<R
                 let mut found = Vec::new();
                 for seed in 1..=options.seeds {
                     let folder = keep.join(format!("{task}-{ground}-{sight}-{seed}"));
-                    found.extend(one(task, arguments, heights, seed, &folder, options, kept_only)?);
+                    found.extend(one(task, arguments, heights, seed, &folder, options, evaluations)?);
                 }
                 if found.is_empty() {
                     continue;
@@ -132,13 +153,19 @@ pub fn run(options: &Options, only: [&[String]; 3], kept_only: bool) -> Result<R
     }
     let mut columns = vec!["figure", "learned on", "sees the ground", "seeds", "decisions", "processor seconds"];
     columns.extend(COURSES.iter().map(|(name, ..)| *name));
-    columns.push("its own adversary");
+    columns.extend(["fresh courses", "worst tenth of them", "its own adversary"]);
     let list = |flag: &str, given: &[&str], all: usize| {
         if given.len() == all { String::new() } else { format!(" {flag} {}", given.join(",")) }
     };
     let mut words = list("--tasks", &tasks, TASKS.len()) + &list("--grounds", &grounds, GROUNDS.len());
     words.push_str(&list("--sights", &sights, SIGHTS.len()));
-    if kept_only {
+    if !evaluations.adversary {
+        words.push_str(" --no-adversary");
+    }
+    if evaluations.fresh != FRESH {
+        words.push_str(&format!(" --fresh {}", evaluations.fresh));
+    }
+    if evaluations.kept_only {
         words.push_str(" --kept-only");
     }
     Ok(Record {
@@ -155,18 +182,26 @@ pub fn run(options: &Options, only: [&[String]; 3], kept_only: bool) -> Result<R
 
 fn about() -> String {
     format!(
-        "Figures learn to run by PPO with `terrain-fast.yaml` on seven kinds of [ground](../reference/environments/terrain.md): *flat*; *random*, \
-         mixed courses of any difficulty; *curriculum*, mixed courses that become harder; *adversary*, built ahead by a second \
-         learner that earns what the runner loses; *bounded*, the same with steps of at most half a meter; *rising*, the same \
-         with steps whose bound rises with the runner's way, from level ground on; *regret*, built by one that earns what a reference \
-         runner, a third learner, earns more on the same ground, with as many decisions for each of the two. Each learns with and without \
-         seeing the ground ahead.\n\n\
+        "Figures learn to run by PPO with `terrain-fast.yaml` on ten kinds of [ground](../reference/environments/terrain.md):\n\n\
+         * *flat*\n\
+         * *random*: mixed courses of any difficulty\n\
+         * *distance*: mixed courses that become harder after long runs\n\
+         * *sfl*, *plr*, *accel*: courses of pieces that each agent chooses by learnability, by regret, or by learnability with edits\n\
+         * *adversary*: built ahead by a second learner that earns what the runner loses\n\
+         * *bounded*: the same with steps of at most half a meter\n\
+         * *rising*: the same with steps whose bound rises with the runner's way, from level ground on\n\
+         * *regret*: built by a learner that earns what a reference runner, a third learner, earns more on the same ground, with \
+         as many decisions for each of the two\n\n\
          The policy's best actions are judged over {EPISODES} episodes on level ground, on the two courses made by hand at full size, on mixed \
          courses of full difficulty, and on the original's meters, of up to 0.5 m. No runner was trained on the courses \
-         made by hand or on the meters. *Its own adversary* has learned against the finished runner for {} decisions, with steps of at most half \
-         a meter, while the runner stayed as it was; some runs have not met one. A cell is the mean way of an episode in m, and how many of {EPISODES} episodes ended with a \
+         made by hand or on the meters. A cell is the mean way of an episode in m, and how many of {EPISODES} episodes ended with a \
          fall: medians over the seeds, and each seed's number in brackets if they differ. The picture has the mean of both \
-         courses made by hand.",
+         courses made by hand.\n\n\
+         *Fresh courses* are random mixed courses of full difficulty, the same for all runners, each run six times. The first three \
+         runs find the worst tenth of the courses for a runner, the others measure it on all courses and on these. A cell is the \
+         mean way and the share of the runs that lasted to the end without a fall.\n\n\
+         *Its own adversary* has learned against the finished runner for {} decisions, with steps of at most half \
+         a meter, while the runner stayed as it was; some runs have not met one.",
         thousands(ADVERSARY_STEPS)
     )
 }
@@ -190,7 +225,7 @@ fn one(
     seed: u64,
     folder: &Path,
     options: &Options,
-    kept_only: bool,
+    Evaluations { kept_only, adversary, fresh }: Evaluations,
 ) -> Result<Option<Found>, StudyError> {
     let sight = ("heights".into(), Value::Bool(heights));
     let with_sight = |list| TaskOptions { given: [arguments(list).given, vec![sight.clone()]].concat() };
@@ -208,21 +243,29 @@ fn one(
         return Ok(None);
     }
     job.train(folder, options)?;
-    let against = kept::Job {
-        arguments: with_sight(&ADVERSARY),
-        loaded: against(task)?,
-        initialize_from: Some(folder.into()),
-        ..job
-    };
+    let mut found = judged(folder, options, fresh)?;
+    if adversary && HAVE_ADVERSARIES.contains(&task) {
+        found.adversary = meets_adversary(job, with_sight(&ADVERSARY), folder, options)?;
+    }
+    kept::write(&file, &found)?;
+    Ok(Some(found))
+}
+
+/// Trains an adversary against the finished runner of a folder, and evaluates the runner on its ground.
+fn meets_adversary(
+    job: kept::Job,
+    arguments: TaskOptions,
+    folder: &Path,
+    options: &Options,
+) -> Result<Option<Judged>, StudyError> {
+    let loaded = against(&job.task)?;
+    let against = kept::Job { arguments, loaded, initialize_from: Some(folder.into()), ..job };
     let path = folder.join("adversary");
     let steps = options.steps.map_or(ADVERSARY_STEPS, |steps| steps.min(ADVERSARY_STEPS));
     against.train(&path, &Options { steps: Some(steps), ..options.clone() })?;
-    let mut found = judged(folder, options)?;
     let [course, _, difficulty] = ADVERSARY.map(|(_, value)| value);
     let (folder, _): (_, RunFile) = RunFolder::open(&path)?;
-    found.adversary = kept::summary(&folder)?.eval.map(|met| Judged::of(course, difficulty, &met));
-    kept::write(&file, &found)?;
-    Ok(Some(found))
+    Ok(kept::summary(&folder)?.eval.map(|met| Judged::of(course, difficulty, &met)))
 }
 
 /// Options of a task, from names and values.
@@ -231,8 +274,8 @@ fn arguments(list: &[(&str, &str)]) -> TaskOptions {
     TaskOptions { given: list.iter().map(|(name, value)| ((*name).into(), read(value))).collect() }
 }
 
-/// Evaluates the policy of a finished run on all courses.
-fn judged(path: &Path, options: &Options) -> Result<Found, StudyError> {
+/// Evaluates the policy of a finished run on all courses, and on a number of fresh ones.
+fn judged(path: &Path, options: &Options, fresh: usize) -> Result<Found, StudyError> {
     let (folder, run): (_, RunFile) = RunFolder::open(path)?;
     let judge = EvalOptions { episodes: EPISODES, threads: options.threads, ..EvalOptions::default() };
     let mut courses = Vec::new();
@@ -242,8 +285,16 @@ fn judged(path: &Path, options: &Options) -> Result<Found, StudyError> {
         let result = evaluate(&*factory, Isa::best(), &policy, &judge)?;
         courses.push(Judged::of(course, difficulty, &result));
     }
+    let fresh = match fresh {
+        0 => None,
+        fresh => {
+            let policy = Policy::load(&folder.policy())?;
+            let task = TaskConfig { agent: run.agent.clone(), options: run.options.clone() };
+            Some(fresh_courses::measure(&policy, &task, fresh, options.threads)?)
+        }
+    };
     let Summary { steps, cpu_seconds, .. } = kept::summary(&folder)?;
-    Ok(Found { run, steps, cpu_seconds, courses, adversary: None })
+    Ok(Found { run, steps, cpu_seconds, courses, fresh, adversary: None })
 }
 
 /// A row of the table.
@@ -270,6 +321,15 @@ fn row(task: &str, ground: &str, heights: bool, found: &[Found]) -> Vec<String> 
         if known.is_empty() { "-".into() } else { format!("{way} m; {falls} fall") }
     };
     out.extend((0..COURSES.len()).map(|i| judged(&|f| f.courses.get(i))));
+    let fresh = |of: &dyn Fn(&Fresh) -> Outcome| {
+        let known: Vec<_> = found.iter().filter_map(|f| f.fresh.as_ref()).map(of).collect();
+        let cell = |value: &dyn Fn(&Outcome) -> f64, text: &dyn Fn(f64) -> String| {
+            cell(&known.iter().map(|result| Some(value(result))).collect::<Vec<_>>(), text)
+        };
+        let (way, finished) = (cell(&|r| r.distance, &|x| format!("{x:.1}")), cell(&|r| 100.0 * r.finished, &whole));
+        if known.is_empty() { "-".into() } else { format!("{way} m; {finished} %") }
+    };
+    out.extend([fresh(&|f| f.all), fresh(&|f| f.worst)]);
     out.push(judged(&|f| f.adversary.as_ref()));
     out
 }

@@ -7,6 +7,7 @@ mod assault_course;
 mod concurrency;
 mod decision_period;
 mod error;
+mod fresh_courses;
 mod headless;
 mod kept;
 mod multi_env;
@@ -65,8 +66,10 @@ fn run(args: &Args) -> Result<(), StudyError> {
         Study::Headless(_) => headless::run(options),
         Study::MultiEnv(_) => multi_env::run(options),
         Study::StyleTransfer { clips, kept_only, .. } => style_transfer::run(options, clips, *kept_only),
-        Study::AssaultCourse { tasks, grounds, sights, kept_only, .. } => {
-            assault_course::run(options, [tasks, grounds, sights], *kept_only)
+        Study::AssaultCourse { tasks, grounds, sights, kept_only, no_adversary, fresh, .. } => {
+            let evaluations =
+                assault_course::Evaluations { kept_only: *kept_only, adversary: !no_adversary, fresh: *fresh };
+            assault_course::run(options, [tasks, grounds, sights], evaluations)
         }
     }?;
     let page = record.save(options)?;

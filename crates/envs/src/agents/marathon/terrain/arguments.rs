@@ -1,5 +1,6 @@
 //! Arguments of figures that run on uneven ground.
 
+use super::bank::Rule;
 use super::course::Kind;
 use crate::agent::Share;
 use crate::agent::options::Choice;
@@ -35,7 +36,7 @@ impl Choice for Falls {
     const NAMED: &'static [(Self, &'static str)] = &[(Falls::End, "end"), (Falls::Hurt, "hurt")];
 }
 
-/// How the difficulty of each course is chosen.
+/// How each course is chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Levels {
     /// The option `difficulty`.
@@ -43,13 +44,43 @@ pub enum Levels {
     /// Uniformly up to that.
     Random,
     /// A level that starts at 0, rises after a long run and falls after a short one.
-    Curriculum,
+    Distance,
+    /// Prioritized level replay of pieces.
+    Plr,
+    /// Replay of pieces and of their edits.
+    Accel,
+    /// Pieces sampled for learnability.
+    Sfl,
+    /// Built by an adversary: short for the course `adversary` of fixed difficulty.
+    Adversary,
+    /// The same, and it earns regret.
+    Regret,
+}
+
+impl Levels {
+    /// The rule of the bank, for levels with one.
+    pub(super) fn rule(self) -> Option<Rule> {
+        match self {
+            Levels::Plr => Some(Rule::Plr),
+            Levels::Accel => Some(Rule::Accel),
+            Levels::Sfl => Some(Rule::Sfl),
+            _ => None,
+        }
+    }
 }
 
 impl Choice for Levels {
-    const EXPECTED: &'static str = "fixed, random or curriculum";
-    const NAMED: &'static [(Self, &'static str)] =
-        &[(Levels::Fixed, "fixed"), (Levels::Random, "random"), (Levels::Curriculum, "curriculum")];
+    const EXPECTED: &'static str = "fixed, random, distance, plr, accel, sfl, adversary or regret";
+    const NAMED: &'static [(Self, &'static str)] = &[
+        (Levels::Fixed, "fixed"),
+        (Levels::Random, "random"),
+        (Levels::Distance, "distance"),
+        (Levels::Plr, "plr"),
+        (Levels::Accel, "accel"),
+        (Levels::Sfl, "sfl"),
+        (Levels::Adversary, "adversary"),
+        (Levels::Regret, "regret"),
+    ];
 }
 
 /// Reward of the adversary.
@@ -74,8 +105,8 @@ crate::options! {
         course: Kind = Kind::Mixed,
         /// Difficulty of the hardest courses (0 to 1).
         difficulty: Share = Share(0.5),
-        /// Difficulty of each course: `fixed`, `random` up to `difficulty`, or `curriculum` (5 % harder after 16 m, 5 %
-        /// easier after less than 8 m).
+        /// How each course is chosen: `fixed`, `random` up to `difficulty`, `distance` (5 % harder after 16 m, 5 % easier
+        /// after less than 8 m), by pieces that teach (`plr`, `accel`, `sfl`), or built by an `adversary`, also for `regret`.
         levels: Levels = Levels::Fixed,
         /// Whether the figure observes the ground ahead.
         heights: bool = true,
@@ -86,5 +117,23 @@ crate::options! {
         /// Reward of the adversary: `inverse` of the runner's reward, or `regret`, how much more a reference runner
         /// earns on the same ground. The reference learns too.
         builder: Earns = Earns::Inverse,
+    }
+}
+
+impl TerrainArguments {
+    /// Kind of ground, also if `levels` name the adversary.
+    pub(super) fn course(&self) -> Kind {
+        match self.levels {
+            Levels::Adversary | Levels::Regret => Kind::Adversary,
+            _ => self.course,
+        }
+    }
+
+    /// Reward of the adversary, also if `levels` name it.
+    pub(super) fn builder(&self) -> Earns {
+        match self.levels {
+            Levels::Regret => Earns::Regret,
+            _ => self.builder,
+        }
     }
 }

@@ -4,6 +4,8 @@
 //! A course is level near the start and then consists of random pieces. Everything that makes a piece hard scales with
 //! the difficulty, 0 to 1. At 0, every course is level.
 
+use super::pieces::PieceKind;
+use super::profile::Profile;
 use crate::agent::options::Choice;
 use crate::episode_rng::EpisodeRng;
 
@@ -93,44 +95,62 @@ const BLOCKS: [[f64; 3]; 5] = [[0.6, 0.1, 3.0], [1.2, 0.2, 2.0], [0.4, 0.3, 4.0]
 impl Kind {
     /// Elevations of a course's points, m above the start.
     pub fn elevations(self, difficulty: f64, random: &mut EpisodeRng) -> Vec<f64> {
-        let mut course = Course { points: Vec::with_capacity(POINTS), height: 0.0, difficulty, random };
-        course.level(LEVEL_TO - FROM);
+        let mut course = Course { profile: Profile::start(), difficulty, random };
         let mut piece = 0;
-        while course.points.len() < POINTS {
+        while !course.profile.is_full() {
             course.add(self, piece);
             piece += 1;
         }
-        course.points.truncate(POINTS);
-        course.points
+        course.profile.finish()
+    }
+
+    /// Kinds of the pieces that levels with a bank draw for this course. Empty if the course has no random pieces.
+    pub(super) fn pieces(self) -> &'static [PieceKind] {
+        match self {
+            Kind::Slopes => &[PieceKind::Slope],
+            Kind::Steps => &[PieceKind::Step],
+            Kind::Stairs => &[PieceKind::Stairs],
+            Kind::Gaps => &[PieceKind::Gap],
+            Kind::Rubble => &[PieceKind::Rubble],
+            Kind::Boxes => &[PieceKind::Box],
+            Kind::Mixed => &PieceKind::ALL,
+            _ => &[],
+        }
     }
 
     /// Heights of a field for a figure in space, m above the start, in rows of increasing y. A field of two rows is a
     /// course, constant along y. With more rows, random pieces are oblique and have bumps that differ along y.
     pub fn field(self, difficulty: f64, rows: usize, random: &mut EpisodeRng) -> Vec<f32> {
         let course = self.elevations(difficulty, random);
-        if rows == 2 || !(MIX.contains(&self) || self == Kind::Mixed) {
-            let row = course.iter().map(|z| *z as f32);
-            return (0..rows).flat_map(|_| row.clone()).collect();
-        }
-        let oblique = random.around_zero(OBLIQUE * difficulty);
-        let knots_in_row = POINTS.div_ceil(KNOT) + 1;
-        let knots: Vec<f64> = (0..rows * knots_in_row).map(|_| random.uniform(0.0, UNEVEN * difficulty)).collect();
-        let first = (LEVEL_TO - FROM) / CELL;
-        let mut field = Vec::with_capacity(rows * POINTS);
-        for (row, knots) in knots.chunks_exact(knots_in_row).enumerate() {
-            let aside = oblique * ROW * (row as f64 - 0.5 * (rows - 1) as f64) / CELL;
-            for point in 0..POINTS {
-                let from_start = point as f64 - first;
-                // the obliqueness grows from 0 at the start
-                let share = (from_start * CELL / BECOMES).clamp(0.0, 1.0);
-                let (knot, part) = (point / KNOT, (point % KNOT) as f64 / KNOT as f64);
-                let bump = (1.0 - part) * knots[knot] + part * knots[knot + 1];
-                let z = between(&course, point as f64 + share * aside);
-                field.push((z + bump * (from_start * CELL).clamp(0.0, 1.0)) as f32);
-            }
-        }
-        field
+        let uneven = MIX.contains(&self) || self == Kind::Mixed;
+        extend(&course, uneven.then_some(difficulty), rows, random)
     }
+}
+
+/// A field of a course. With a difficulty and more than two rows, it is oblique and has bumps.
+pub(super) fn extend(course: &[f64], difficulty: Option<f64>, rows: usize, random: &mut EpisodeRng) -> Vec<f32> {
+    let Some(difficulty) = difficulty.filter(|_| rows > 2) else {
+        let row = course.iter().map(|z| *z as f32);
+        return (0..rows).flat_map(|_| row.clone()).collect();
+    };
+    let oblique = random.around_zero(OBLIQUE * difficulty);
+    let knots_in_row = POINTS.div_ceil(KNOT) + 1;
+    let knots: Vec<f64> = (0..rows * knots_in_row).map(|_| random.uniform(0.0, UNEVEN * difficulty)).collect();
+    let first = (LEVEL_TO - FROM) / CELL;
+    let mut field = Vec::with_capacity(rows * POINTS);
+    for (row, knots) in knots.chunks_exact(knots_in_row).enumerate() {
+        let aside = oblique * ROW * (row as f64 - 0.5 * (rows - 1) as f64) / CELL;
+        for point in 0..POINTS {
+            let from_start = point as f64 - first;
+            // the obliqueness grows from 0 at the start
+            let share = (from_start * CELL / BECOMES).clamp(0.0, 1.0);
+            let (knot, part) = (point / KNOT, (point % KNOT) as f64 / KNOT as f64);
+            let bump = (1.0 - part) * knots[knot] + part * knots[knot + 1];
+            let z = between(course, point as f64 + share * aside);
+            field.push((z + bump * (from_start * CELL).clamp(0.0, 1.0)) as f32);
+        }
+    }
+    field
 }
 
 /// Height between two points of a course. Outside, the height of the nearest end.
@@ -142,9 +162,7 @@ fn between(course: &[f64], at: f64) -> f64 {
 
 /// A course under construction.
 struct Course<'a> {
-    points: Vec<f64>,
-    /// Height at the present end.
-    height: f64,
+    profile: Profile,
     difficulty: f64,
     random: &'a mut EpisodeRng,
 }
@@ -154,15 +172,15 @@ impl Course<'_> {
     fn add(&mut self, kind: Kind, piece: usize) {
         let hard = self.difficulty;
         match kind {
-            Kind::Flat | Kind::Adversary => self.level(10.0),
+            Kind::Flat | Kind::Adversary => self.profile.level(10.0),
             Kind::Slopes => {
                 let length = self.random.uniform(1.0, 4.0);
                 let slope = self.signed(0.0, 0.35 * hard);
-                self.slope(length, slope * length);
+                self.profile.slope(length, slope * length);
                 self.pause(0.0, 1.0);
             }
             Kind::Steps => {
-                self.height += self.signed(0.075 * hard, 0.25 * hard);
+                self.profile.height += self.signed(0.075 * hard, 0.25 * hard);
                 self.pause(0.6, 2.0);
             }
             Kind::Stairs => {
@@ -170,27 +188,27 @@ impl Course<'_> {
                 let (tread, first) = (self.random.uniform(0.3, 0.5), self.signed(1.0, 1.0).signum());
                 for side in [first, -first] {
                     for _ in 0..count {
-                        self.height += side * rise;
-                        self.level(tread);
+                        self.profile.height += side * rise;
+                        self.profile.level(tread);
                     }
                     self.pause(1.0, 2.0);
                 }
             }
             Kind::Gaps => {
                 let width = self.random.uniform(0.3, 0.9) * hard;
-                self.beside(width, -DEPTH);
+                self.profile.beside(width, -DEPTH);
                 self.pause(1.5, 4.0);
             }
             Kind::Rubble => {
                 for _ in 0..self.random.whole(10, 20) {
                     let height = self.random.uniform(0.0, 0.12) * hard;
-                    self.beside(0.2, height);
+                    self.profile.beside(0.2, height);
                 }
                 self.pause(0.5, 1.5);
             }
             Kind::Boxes => {
                 let (height, length) = (self.random.uniform(0.1, 0.35) * hard, self.random.uniform(0.3, 1.0));
-                self.beside(length, height);
+                self.profile.beside(length, height);
                 self.pause(1.5, 4.0);
             }
             Kind::Mixed => {
@@ -199,64 +217,33 @@ impl Course<'_> {
             }
             Kind::Meters => {
                 let steps = self.random.whole(0, 20) as f64 - 10.0;
-                let rise = (self.height + 0.1 * steps * hard).clamp(-FARTHEST, FARTHEST) - self.height;
-                self.slope(1.0, rise);
+                let rise = (self.profile.height + 0.1 * steps * hard).clamp(-FARTHEST, FARTHEST) - self.profile.height;
+                self.profile.slope(1.0, rise);
             }
             Kind::Bumps => {
                 let [length, height, pause] = BUMPS[piece % BUMPS.len()];
-                self.bump(length, height * hard);
-                self.level(pause);
+                self.profile.bump(length, height * hard);
+                self.profile.level(pause);
             }
             Kind::Blocks => {
                 let [length, height, pause] = BLOCKS[piece % BLOCKS.len()];
-                self.beside(length, height * hard);
-                self.level(pause);
+                self.profile.beside(length, height * hard);
+                self.profile.level(pause);
             }
         }
-    }
-
-    /// Level ground.
-    fn level(&mut self, length: f64) {
-        self.slope(length, 0.0);
     }
 
     /// Level ground of a random length in a range.
     fn pause(&mut self, least: f64, most: f64) {
         let length = self.random.uniform(least, most);
-        self.level(length);
-    }
-
-    /// A slope at least one point long.
-    fn slope(&mut self, length: f64, rise: f64) {
-        let points = (length / CELL).round();
-        for i in 1..=points as usize {
-            self.points.push(self.height + rise * i as f64 / points);
-        }
-        self.height += if points > 0.0 { rise } else { 0.0 };
-    }
-
-    /// Ground that is higher or lower than its surroundings.
-    fn beside(&mut self, length: f64, height: f64) {
-        self.height += height;
-        self.level(length);
-        self.height -= height;
-    }
-
-    /// A smooth bump, u^2 (1 - u)^2. Its slope is 0 at both ends.
-    fn bump(&mut self, length: f64, height: f64) {
-        let points = (length / CELL).round();
-        for i in 1..=points as usize {
-            let u = i as f64 / points;
-            let half = u * (1.0 - u);
-            self.points.push(self.height + 16.0 * height * half * half);
-        }
+        self.profile.level(length);
     }
 
     /// A random number with an absolute value in a range. The sign is random, or leads back if the height is near its
     /// limit.
     fn signed(&mut self, least: f64, most: f64) -> f64 {
         let size = self.random.uniform(least, most);
-        let up = match self.height {
+        let up = match self.profile.height {
             high if high > FARTHEST - 1.5 => false,
             low if low < 1.5 - FARTHEST => true,
             _ => self.random.uniform(0.0, 1.0) < 0.5,

@@ -19,8 +19,12 @@
 //! With the course `adversary` the task has two roles: the figure, and a builder who earns -r; with `builder=regret` three.
 
 mod arguments;
+mod bank;
 mod builder;
 pub mod course;
+mod pieces;
+mod plan;
+mod profile;
 mod regret;
 mod runners;
 
@@ -42,6 +46,7 @@ use crate::agent::{
 use crate::episode_rng::EpisodeRng;
 use arguments::{Earns, Falls, Levels, Reward};
 use course::{FROM, Kind, POINTS, ROW, TO};
+use plan::Teacher;
 
 /// Points at which the ground is seen, and how far one is from the next and the first behind the figure, m.
 const SEEN: usize = 25;
@@ -137,12 +142,28 @@ impl<F: Runner> Terrain<F> {
 
     /// Whether an adversary builds the ground.
     fn built(&self) -> bool {
-        self.arguments.course == Kind::Adversary
+        self.arguments.course() == Kind::Adversary
     }
 
     /// Whether it earns what a reference earns more than the runner.
     fn regrets(&self) -> bool {
-        self.built() && self.arguments.builder == Earns::Regret
+        self.built() && self.arguments.builder() == Earns::Regret
+    }
+
+    /// How the agent chooses the pieces of its courses. `None` for levels without a bank, and for courses without pieces.
+    fn teacher(&self) -> Option<Teacher> {
+        let TerrainArguments { difficulty: Share(difficulty), levels, .. } = self.arguments;
+        let (rule, kinds) = (levels.rule()?, self.arguments.course().pieces());
+        (!kinds.is_empty()).then_some(Teacher { rule, kinds, difficulty })
+    }
+
+    /// Number of the course's variables.
+    fn course_memory(&self) -> usize {
+        match self.teacher() {
+            Some(_) => plan::MEMORY,
+            None if self.regrets() => regret::MEMORY,
+            None => MEMORY,
+        }
     }
 
     /// Actuators of roles without a body, behind the figure's own: the reference's, and the adversary's.
@@ -222,10 +243,16 @@ impl<F: Runner> Terrain<F> {
         out.scalar(cells - cells.floor());
     }
 
+    /// Lanes that have made no new meter for too long.
+    #[inline(always)]
+    fn stuck<T: Real>(s: &Senses<T>, memory: &[T]) -> T::Mask {
+        T::lit(PATIENCE / s.dt()).lt(memory[SINCE])
+    }
+
     /// Lanes that have made no new meter for too long, or have come to the end of the course or to within 0.2 m of its edge.
     #[inline(always)]
     fn stopped<T: Real>(s: &Senses<T>, memory: &[T]) -> T::Mask {
-        let stuck = T::lit(PATIENCE / s.dt()).lt(memory[SINCE]);
+        let stuck = Self::stuck(s, memory);
         let aside = s.position(F::TORSO)[1].abs();
         let through = T::or(T::lit(TO - 1.0).lt(memory[AT]), T::lit(F::HALF_WIDTH - EDGE).lt(aside));
         T::or(stuck, through)
@@ -274,7 +301,7 @@ impl<F: Runner> Agent for Terrain<F> {
             roles,
             info: names(["distance", "difficulty"]),
             metrics: names(["forward", "difficulty"]),
-            memory: F::MEMORY + if self.regrets() { regret::MEMORY } else { MEMORY },
+            memory: F::MEMORY + self.course_memory(),
             max_episode_steps,
             termination_reward: fall_penalty,
             ..own
@@ -290,11 +317,20 @@ impl<F: Runner> Agent for Terrain<F> {
     }
 
     fn reset(&self, start: &mut Start) {
-        let TerrainArguments { course, difficulty: Share(most), levels, .. } = self.arguments;
+        let TerrainArguments { difficulty: Share(most), levels, .. } = self.arguments;
+        if let Some(teacher) = self.teacher() {
+            let (previous, memory) = (&start.previous[F::MEMORY..], &mut start.memory[F::MEMORY..]);
+            let (course, difficulty) = teacher.draw(previous, memory, start.random);
+            (memory[LEVEL], memory[DIFFICULTY]) = (1.0, difficulty);
+            let field = course::extend(&course, Some(difficulty), Self::ROWS, start.random);
+            start.set_ground(0, field);
+            return self.figure.place(start);
+        }
+        let course = self.arguments.course();
         let level = match levels {
-            Levels::Fixed => 1.0,
             Levels::Random => start.random.uniform(0.0, 1.0),
-            Levels::Curriculum => Self::next_level(start.previous),
+            Levels::Distance => Self::next_level(start.previous),
+            _ => 1.0,
         };
         let difficulty = level * most;
         let field = course.field(difficulty, Self::ROWS, start.random);
@@ -335,6 +371,9 @@ impl<F: Runner> Agent for Terrain<F> {
             memory[slot] = x;
         }
         memory[DUE] = T::lit(1.0);
+        if self.teacher().is_some() {
+            plan::begin(memory);
+        }
     }
 
     #[inline(always)]
@@ -343,7 +382,7 @@ impl<F: Runner> Agent for Terrain<F> {
         self.figure.remember(s, own);
         let (zero, one) = (T::zero(), T::lit(1.0));
         let [x, ..] = s.position(F::TORSO);
-        memory[AT] = x;
+        let from = std::mem::replace(&mut memory[AT], x);
         memory[FARTHEST] = memory[FARTHEST].max(x);
         let new = (memory[MARK] + one).lt(x);
         memory[MARK] = T::select(new, memory[MARK] + one, memory[MARK]);
@@ -357,6 +396,9 @@ impl<F: Runner> Agent for Terrain<F> {
             let ended = [self.failed(memory), Self::stopped(s, memory)];
             let begins = regret::remember(memory, ended, s.dt());
             self.begin_again(s, own, begins);
+        }
+        if self.teacher().is_some() {
+            plan::remember(memory, from, Self::stuck(s, memory), s.dt());
         }
     }
 

@@ -1,0 +1,161 @@
+//! The evaluation of a runner on fresh random courses, above all on those that are hardest for it: the conditional value at
+//! risk of Rutherford and others, "No regrets" (2024).
+//!
+//! A first set of rollouts finds the worst courses, and a second one measures the runner on them. Courses that were only
+//! run badly by chance therefore do not count as the worst ones.
+
+use crate::error::StudyError;
+use marathon_envs::options::Value;
+use marathon_envs::{Autoreset, VecEnv, VecEnvOptions};
+use marathon_learn::{BlockPolicy, Policy};
+use marathon_physics::lanes::Isa;
+use marathon_runs::TaskConfig;
+use serde::{Deserialize, Serialize};
+
+/// Seed of the courses, and of the first rollout. No training has it.
+const SEED: u64 = 1_000_033;
+/// Rollouts on each course in each of the two sets.
+const ROLLOUTS: u64 = 3;
+/// Share of the courses that are the worst ones.
+const WORST: f64 = 0.1;
+/// Courses that are run at the same time.
+const AT_ONCE: usize = 256;
+/// Distance at which a course has been run to its end, m.
+const THROUGH: f32 = 104.0;
+
+/// Results on fresh courses.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fresh {
+    /// Number of courses.
+    pub courses: usize,
+    /// On all courses.
+    pub all: Outcome,
+    /// On the worst tenth of them.
+    pub worst: Outcome,
+}
+
+/// Means over rollouts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Outcome {
+    /// Mean distance, m.
+    pub distance: f64,
+    /// Share of the rollouts that lasted until the time limit or the end of the course, without a fall.
+    pub finished: f64,
+}
+
+/// Runs a policy on fresh mixed courses of difficulty 1. `task` has its other options.
+///
+/// # Errors
+/// If the policy is for another task, or the environments cannot be made.
+pub fn measure(policy: &Policy, task: &TaskConfig, courses: usize, threads: usize) -> Result<Fresh, StudyError> {
+    let mut task = task.clone();
+    for (name, value) in [("course", "mixed".into()), ("levels", "fixed".into()), ("difficulty", Value::Number(1.0))] {
+        task.options.set(name, value);
+    }
+    let mut all = Vec::with_capacity(courses);
+    for first in (0..courses).step_by(AT_ONCE) {
+        let agents = AT_ONCE.min(courses - first);
+        let made = VecEnvOptions { agents, threads, autoreset: Autoreset::Disabled, ..Default::default() };
+        all.extend(Batch::new(task.vec_env(&made)?, policy, SEED + first as u64)?.run()?);
+    }
+    Ok(summary(&all))
+}
+
+/// Courses that are run at the same time.
+struct Batch<'a> {
+    env: VecEnv,
+    policy: BlockPolicy<&'a Policy>,
+    seed: u64,
+    grounds: Vec<Vec<f32>>,
+}
+
+impl<'a> Batch<'a> {
+    /// Draws the courses of a seed: those of the first episodes.
+    fn new(mut env: VecEnv, policy: &'a Policy, seed: u64) -> Result<Self, StudyError> {
+        policy.check(env.spec())?;
+        let mut out = env.buffers();
+        env.reset(Some(seed), &mut out.obs)?;
+        let grounds = (0..env.agents()).map(|i| env.ground(i, 0)).collect::<Result<_, _>>()?;
+        Ok(Batch { env, policy: BlockPolicy::new(policy, Isa::best()), seed, grounds })
+    }
+
+    /// Results of each course: in the first set of rollouts and in the second.
+    fn run(mut self) -> Result<Vec<[Outcome; 2]>, StudyError> {
+        let mut all = vec![[Outcome::default(); 2]; self.grounds.len()];
+        for rollout in 0..2 * ROLLOUTS {
+            let results = self.rollout(self.seed + (1 + rollout) * 1_000_003)?;
+            for (course, Outcome { distance, finished }) in all.iter_mut().zip(results) {
+                let sum = &mut course[(rollout / ROLLOUTS) as usize];
+                sum.distance += distance / ROLLOUTS as f64;
+                sum.finished += finished / ROLLOUTS as f64;
+            }
+        }
+        Ok(all)
+    }
+
+    /// Runs each course once, with the starts of a seed.
+    fn rollout(&mut self, seed: u64) -> Result<Vec<Outcome>, StudyError> {
+        let Batch { env, policy, grounds, .. } = self;
+        let (agents, info, limit) = (env.agents(), env.spec().info.len(), env.spec().max_episode_steps);
+        let way = env.spec().info.iter().position(|name| name == "distance").unwrap_or_default();
+        let mut out = env.buffers();
+        env.reset(Some(seed), &mut out.obs)?;
+        for (i, ground) in grounds.iter().enumerate() {
+            env.set_ground(i, 0, ground)?;
+        }
+        env.observe(&vec![true; agents], &mut out.obs)?;
+        let mut action = vec![0.0; agents * env.spec().act];
+        let mut results: Vec<Option<Outcome>> = vec![None; agents];
+        for decision in 1..=limit {
+            policy.act_rows(&out.obs, None, &mut action);
+            env.step(&action, &mut out)?;
+            for (i, result) in results.iter_mut().enumerate().filter(|(_, result)| result.is_none()) {
+                let over = out.terminated[i] || out.truncated[i] || out.diverged[i];
+                if over || decision == limit {
+                    let distance = out.info[info * i + way];
+                    let stays = !(out.terminated[i] || out.diverged[i]);
+                    let finished = stays && (decision == limit || distance > THROUGH);
+                    let finished = f64::from(u8::from(finished));
+                    *result = Some(Outcome { distance: f64::from(distance), finished });
+                }
+            }
+            if results.iter().all(Option::is_some) {
+                break;
+            }
+        }
+        Ok(results.into_iter().flatten().collect())
+    }
+}
+
+/// Means of all courses, and of those with the shortest distances in the first set, both in the second set.
+fn summary(all: &[[Outcome; 2]]) -> Fresh {
+    let mut order: Vec<&[Outcome; 2]> = all.iter().collect();
+    order.sort_by(|a, b| a[0].distance.total_cmp(&b[0].distance));
+    let mean = |some: &[&[Outcome; 2]]| {
+        let of = |value: &dyn Fn(&Outcome) -> f64| some.iter().map(|c| value(&c[1])).sum::<f64>() / some.len() as f64;
+        Outcome { distance: of(&|r| r.distance), finished: of(&|r| r.finished) }
+    };
+    let worst = ((WORST * all.len() as f64).ceil() as usize).max(1);
+    Fresh { courses: all.len(), all: mean(&order), worst: mean(&order[..worst]) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_worst_courses_are_judged_by_other_rollouts() {
+        let course = |first: f64, second: f64| {
+            [first, second].map(|distance| Outcome { distance, finished: f64::from(u8::from(distance > 15.0)) })
+        };
+        // 20 courses: the two that were worst at first are not the worst ones afterwards
+        let mut all: Vec<_> = (0..18).map(|_| course(20.0, 10.0)).collect();
+        all.extend([course(1.0, 20.0), course(2.0, 30.0)]);
+        let fresh = summary(&all);
+        assert_eq!((fresh.courses, fresh.worst), (20, Outcome { distance: 25.0, finished: 1.0 }));
+        assert!((fresh.all.distance - (180.0 + 50.0) / 20.0).abs() < 1e-12 && (fresh.all.finished - 0.1).abs() < 1e-12);
+        assert_eq!(summary(&all[..3]).worst.distance, 10.0, "at least one course");
+    }
+}
