@@ -23,6 +23,8 @@ const SEEDS: usize = 1 << 24;
 /// Most numbers that an edit changes, and the largest change in the number's steps.
 const EDITS: usize = 2;
 const STRIDE: f64 = 3.0;
+/// Share of edits that change a size. The others change any number.
+const SIZES: f64 = 0.5;
 /// Share of edits that mirror a piece that can be mirrored.
 const MIRRORED: f64 = 0.1;
 /// Share of edits that keep the seed: the same layout, a little different in size.
@@ -150,8 +152,9 @@ impl Piece {
         Piece { kind, numbers, seed: seed(random) }
     }
 
-    /// A child that differs in one or two numbers, or is mirrored. It stays within the bounds of the difficulty.
-    pub fn edited(&self, difficulty: f64, random: &mut EpisodeRng) -> Self {
+    /// A child that differs in one or two numbers, or is mirrored. It stays within the bounds of the difficulty. A size
+    /// grows with the probability `grows`, otherwise it shrinks.
+    pub fn edited(&self, grows: f64, difficulty: f64, random: &mut EpisodeRng) -> Self {
         let mut child = *self;
         let all = self.kind.numbers();
         for _ in 0..random.whole(1, EDITS) {
@@ -161,12 +164,20 @@ impl Piece {
                 child.numbers[side] = -child.numbers[side];
                 continue;
             }
-            // the sides have their own edit
-            let can = all.iter().filter(|number| number.role != Role::Side).count();
-            let i = random.whole(0, can - 1);
-            let i = all.iter().enumerate().filter(|(_, number)| number.role != Role::Side).nth(i).map_or(0, |(i, _)| i);
-            let change = all[i].step * random.uniform(0.0, STRIDE) * [-1.0, 1.0][random.whole(0, 1)];
-            child.numbers[i] += if all[i].role == Role::Count { away_from_zero(change) } else { change };
+            let sizes_only = random.uniform(0.0, 1.0) < SIZES;
+            // the sides have an edit of their own
+            let may = |role: Role| if sizes_only { role == Role::Size } else { role != Role::Side };
+            let can = || all.iter().enumerate().filter(|(_, number)| may(number.role));
+            let Some((i, number)) = can().nth(random.whole(0, can().count() - 1)) else { continue };
+            let up = random.uniform(0.0, 1.0) < if number.role == Role::Size { grows } else { 0.5 };
+            let change = number.step * random.uniform(0.0, STRIDE) * if up { 1.0 } else { -1.0 };
+            let x = &mut child.numbers[i];
+            *x += match number.role {
+                // downwards, a size grows to the other side
+                Role::Size if *x < 0.0 => -change,
+                Role::Count => away_from_zero(change),
+                _ => change,
+            };
         }
         if random.uniform(0.0, 1.0) >= SAME_SEED {
             child.seed = seed(random);
@@ -181,7 +192,7 @@ impl Piece {
                 Role::Size => [low.min(0.0) * difficulty, high * difficulty],
                 _ => [*low, *high],
             };
-            *x = single(x.clamp(low, high)).clamp(low, high);
+            *x = single(x.clamp(low, high));
         }
         self
     }
@@ -289,14 +300,16 @@ mod tests {
                 assert!(piece.kind == kind && is_within(&piece, difficulty), "{piece:?}");
                 let (mut same, mut seeds) = (0, 0);
                 for _ in 0..300 {
-                    let child = piece.edited(difficulty, &mut random);
+                    let child = piece.edited(0.5, difficulty, &mut random);
                     assert!(child.kind == kind && is_within(&child, difficulty), "{piece:?} {child:?}");
                     assert!(child.size() <= difficulty + 1e-6);
                     same += usize::from(child.numbers == piece.numbers);
                     seeds += usize::from(child.seed == piece.seed);
                     piece = child;
                 }
-                assert!(same < 90 && (100..200).contains(&seeds), "{kind:?}: {same} without a change, {seeds} seeds");
+                // no size changes on level ground
+                let most = if difficulty > 0.0 { 90 } else { 300 };
+                assert!(same < most && (100..200).contains(&seeds), "{kind:?}: {same} without a change, {seeds} seeds");
             }
         }
     }
@@ -308,7 +321,7 @@ mod tests {
         for kind in PieceKind::ALL {
             let mut largest = Piece::random(&[kind], 0.05, &mut random);
             for _ in 0..400 {
-                let child = largest.edited(1.0, &mut random);
+                let child = largest.edited(0.5, 1.0, &mut random);
                 largest = if child.size() > largest.size() { child } else { largest };
             }
             assert!(largest.size() > 0.95, "{largest:?}");
@@ -319,7 +332,7 @@ mod tests {
     fn a_piece_survives_the_memory_of_a_lane() {
         let mut random = EpisodeRng::numbered(3);
         for _ in 0..100 {
-            let piece = Piece::random(&PieceKind::ALL, 0.7, &mut random).edited(0.7, &mut random);
+            let piece = Piece::random(&PieceKind::ALL, 0.7, &mut random).edited(0.5, 0.7, &mut random);
             let mut slots = [0.0; SLOTS];
             piece.write(&mut slots);
             assert_eq!(Piece::read(&slots.map(|x| f64::from(x as f32))), Some(piece));

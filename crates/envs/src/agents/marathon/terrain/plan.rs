@@ -52,6 +52,8 @@ const AHEAD: f64 = 0.5;
 const HORIZON: f64 = 1.0;
 /// Largest size of an easy piece as a share of the difficulty.
 const EASY: f64 = 0.25;
+/// Most children after an episode.
+const CHILDREN: usize = 3;
 /// Number of seeds of courses. Lanes store them in single precision.
 const SEEDS: usize = 1 << 24;
 /// A place that no figure reaches, m.
@@ -129,10 +131,10 @@ impl Teacher {
         }
         if self.rule == Rule::Accel {
             replayed.retain(|i| bank.get(*i).is_some_and(Record::can_have_a_child));
-            if !replayed.is_empty() {
-                let parent = replayed[random.whole(0, replayed.len() - 1)];
-                let child = bank.get(parent).map(|record| record.piece.edited(self.difficulty, random));
-                if let Some(child) = child {
+            for _ in 0..CHILDREN.min(replayed.len()) {
+                let parent = replayed.swap_remove(random.whole(0, replayed.len() - 1));
+                if let Some(record) = bank.get(parent) {
+                    let child = record.piece.edited(record.pass_rate(), self.difficulty, random);
                     bank.admit(Record::new(child), self.rule, Some(parent));
                 }
             }
@@ -257,7 +259,7 @@ mod tests {
         let mut memory = vec![0.0; MEMORY];
         teacher(Rule::Sfl).draw(&[0.0; MEMORY], &mut memory, &mut EpisodeRng::numbered(1));
         let starts = memory[STARTS..STARTS + PIECES].to_vec();
-        assert!(starts[0] == LEVEL_TO && starts.windows(2).all(|pair| pair[0] < pair[1]));
+        assert!(starts[0] == LEVEL_TO && starts.windows(2).all(|pair| pair[0] < pair[1] || pair[0] == NEVER));
         // 0.25 s at 4 m/s are a meter
         let mut fallen = memory.clone();
         run_to(&mut fallen, starts[4] + 1.5, true);
