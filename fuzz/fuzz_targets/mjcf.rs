@@ -34,11 +34,22 @@ fuzz_target!(|data: &[u8]| {
     }
 });
 
-/// Files that a model may include or read heights from.
+/// A model with parts and with what refers to them.
+const ARM: &[u8] = b"<mujoco model='arm'><compiler angle='radian'/><default><geom size='.1'/></default><worldbody>
+<body name='a' euler='1 0 0'><joint name='j' range='0 1'/><geom name='g'/><frame name='f'><site name='s'/></frame></body></worldbody>
+<tendon><fixed name='t'><joint joint='j' coef='1'/></fixed></tendon><actuator><motor joint='j'/></actuator>
+<sensor><clock/><accelerometer site='s'/></sensor><keyframe><key name='k' qpos='1'/></keyframe></mujoco>";
+/// A model that attaches itself.
+const RING: &[u8] = b"<mujoco model='ring'><asset><model name='r' file='ring.xml'/></asset>
+<worldbody><attach model='r' prefix='r'/></worldbody></mujoco>";
+
+/// Files that a model may include, attach or read heights from.
 fn other_file(name: &str) -> Result<Vec<u8>, String> {
     match name {
         "part.xml" => Ok(b"<mujoco><body><geom size='.1'/></body></mujoco>".to_vec()),
         "self.xml" => Ok(b"<mujoco><include file='self.xml'/></mujoco>".to_vec()),
+        "arm.xml" => Ok(ARM.to_vec()),
+        "ring.xml" => Ok(RING.to_vec()),
         "grid.bin" => Ok([2i32.to_le_bytes(), 2i32.to_le_bytes()].concat().into_iter().chain([0; 16]).collect()),
         _ => Err("there is no such file".to_owned()),
     }

@@ -78,7 +78,10 @@ fn names_must_be_unique() {
     check(&with_section("<sensor><clock name='a'/><clock name='a'/></sensor>"), &["already a sensor"]);
     let classes = "<default><default class='a'/>\n<default class='a'/></default>";
     check(&format!("<mujoco>{classes}</mujoco>"), &["bad.xml:2:", "the default class 'a' is already defined"]);
-    check("<mujoco><default class='x'/></mujoco>", &["the outermost default class is named 'main'"]);
+    check(
+        "<mujoco><default class='x'/></mujoco>",
+        &["the outermost default class is 'x'; expected no 'class', or 'main'"],
+    );
     check("<mujoco><default><default/></default></mujoco>", &["a nested default needs the attribute 'class'"]);
 }
 
@@ -216,6 +219,25 @@ fn copies() {
     let xml = "<mujoco><worldbody><replicate count='2'><body name='a'><geom size='1'/></body></replicate>
         <body name='b'><geom size='1'/></body></worldbody><equality><connect body1='a' body2='b' anchor='0 0 0'/></equality></mujoco>";
     check(xml, &["there is no body 'a'", "'a0'"]);
+}
+
+/// Bodies never sleep here, so only the policy that starts asleep changes the motion.
+#[test]
+fn sleep() {
+    let xml = |flag: &str, policy: &str| {
+        let option = format!("<option sleep_tolerance='1e-3'><flag sleep='{flag}'/></option>");
+        with_section(&option).replace("<body name=\"b\">", &format!("<body name=\"b\" sleep=\"{policy}\">"))
+    };
+    for policy in ["auto", "never", "allowed"] {
+        assert!(Model::from_xml_str(&xml("enable", policy), "good.xml").is_ok());
+    }
+    assert!(Model::from_xml_str(&xml("disable", "init"), "good.xml").is_ok());
+    check(&xml("enable", "init"), &["bad.xml:3: <body name=\"b\"> attribute 'sleep': 'init' is not supported"]);
+    check(&xml("enable", "alowed"), &["'sleep' is 'alowed'", "did you mean 'allowed'?"]);
+    check(
+        &in_body("<body sleep='never'><joint/><geom size='1'/></body>"),
+        &["bad.xml:5:", "'sleep' belongs to a body"],
+    );
 }
 
 #[test]
@@ -415,6 +437,12 @@ fn broken_files() {
     check("<mujoco>\n<worldbody>\n</mujoco>", &["bad.xml:3:", "not well-formed XML"]);
     check("<robot/>", &["the top-level element is <robot>; expected <mujoco>"]);
     check("<!DOCTYPE x [<!ENTITY a 'b'>]><mujoco model='&a;'/>", &["not well-formed XML"]);
+    // MuJoCo's parser reads on behind these, and so does this one
+    let world = "<worldbody><!-\\- a -\\-><geom name='a'size='1'/></worldbody>";
+    assert!(
+        Model::from_xml_str(&format!("<!DOCTYPE mujoco>\n<mujoco>{world}</mujoco>\n</mujoco>\n"), "good.xml").is_ok()
+    );
+    check(&format!("<mujoco>{world}</mujoco>\n<mujoco/>"), &["bad.xml:2:", "not well-formed XML"]);
     let deep = format!("<mujoco><worldbody>{}{}</worldbody></mujoco>", "<body>".repeat(5000), "</body>".repeat(5000));
     check(&deep, &["nested more than"]);
     let missing = Model::from_xml_file("no/such/model.xml").unwrap_err().to_string();

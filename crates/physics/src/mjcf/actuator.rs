@@ -124,7 +124,7 @@ fn check_range(
     (name, range): (&str, [f64; 2]),
     settings: &Settings,
 ) -> Result<(), MjcfError> {
-    if state == Tristate::Auto && range != [0.0; 2] && !settings.autolimits {
+    if state == Tristate::Auto && range != [0.0; 2] && !settings.of(attrs.element).autolimits {
         let message = format!("there is '{name}' but not '{switch}', and the compiler's autolimits is false");
         return Err(attrs.element.invalid(message));
     }

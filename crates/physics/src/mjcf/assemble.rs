@@ -26,6 +26,7 @@ pub(crate) fn compile(root: &Element, file: &ReadFile, room: &Room) -> Result<Mo
     let opt = settings::options(root)?;
     let mut settings = Settings::read(root)?;
     settings.medium = opt.density != 0.0 || opt.viscosity != 0.0;
+    settings.sleep = settings::sleep(root);
     let given = settings::statistics(root)?;
     let defaults = Defaults::read(root, room)?;
     check_defaults(&defaults, &settings)?;

@@ -91,7 +91,7 @@ fn hfield(
     }
     let mut grid = match element.attr("file").filter(|a| !a.value.is_empty()) {
         Some(attr) => {
-            let path = settings.asset_path(&attr.value);
+            let path = settings.of(element).asset_path(&attr.value);
             let failed = |reason: String| {
                 let kind = super::error::MjcfErrorKind::Read(format!("height field file '{path}': {reason}"));
                 attr.place.error(kind)

@@ -68,11 +68,16 @@ impl<'a> Defaults<'a> {
     pub fn read(root: &'a Element, room: &'a Room) -> Result<Self, MjcfError> {
         let mut defaults = Defaults { classes: BTreeMap::from([(MAIN, Class::default())]), room };
         for section in root.children.iter().filter(|e| e.name == "default") {
-            if section.text("class").is_some_and(|c| c != MAIN) {
-                let message = format!("the outermost default class is named '{MAIN}'; leave 'class' out");
+            let name = section.text("class").filter(|class| !class.is_empty()).unwrap_or(MAIN);
+            // an attached model has an outermost class of its own
+            if name != MAIN && section.settings.is_none() {
+                let message = format!(
+                    "the outermost default class is '{}'; expected no 'class', or '{MAIN}', as in MuJoCo",
+                    shorten(name)
+                );
                 return Err(section.invalid(message));
             }
-            defaults.section(section, MAIN)?;
+            defaults.section(section, name)?;
         }
         Ok(defaults)
     }

@@ -2,8 +2,9 @@
 
 use super::error::{MjcfError, MjcfErrorKind, shorten};
 use super::room::{ELEMENT, Room};
+use super::settings::Settings;
+use super::xml::{self, MAX_ATTRIBUTES};
 use crate::hint::nearest;
-use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -11,8 +12,6 @@ use std::sync::Arc;
 pub(crate) const MAX_DEPTH: usize = 200;
 /// Elements, text pieces and comments per file; keeps memory in proportion.
 const MAX_NODES: u32 = 4_000_000;
-/// Limit on the attributes of an element. The parser compares each with all others.
-const MAX_ATTRIBUTES: usize = 500;
 
 /// Where something stands: file and line.
 #[derive(Clone, Debug)]
@@ -35,6 +34,20 @@ pub(crate) struct Attr {
     pub place: Place,
 }
 
+/// The part of a keyframe that belongs to one element of a model that is attached to another one.
+#[derive(Clone, Debug)]
+pub(crate) struct KeyNumbers {
+    /// Name of the keyframe.
+    pub key: String,
+    /// The keyframe is one of the model itself, not of a model that is attached to it.
+    pub own: bool,
+    /// Numbers for each list of the keyframe.
+    pub lists: [Vec<f64>; LISTS.len()],
+}
+
+/// Lists of a key. Each holds the numbers of all joints, actuators or mocap bodies in their order.
+pub(crate) const LISTS: [&str; 6] = ["qpos", "qvel", "act", "ctrl", "mpos", "mquat"];
+
 /// One element with everything below it.
 #[derive(Clone, Debug)]
 pub(crate) struct Element {
@@ -42,6 +55,10 @@ pub(crate) struct Element {
     pub attrs: Vec<Attr>,
     pub children: Vec<Element>,
     pub place: Place,
+    /// Compiler settings of the model that the element was attached from.
+    pub settings: Option<Arc<Settings>>,
+    /// Numbers of the element in keyframes that are not written yet.
+    pub keys: Vec<KeyNumbers>,
 }
 
 impl Element {
@@ -107,6 +124,7 @@ impl Room {
     /// Takes room for a document that is already parsed.
     pub fn take_document(&self, root: &Element) -> Result<(), MjcfError> {
         self.take_element(root, root.attrs.len(), root.attrs.iter().map(|a| a.value.len()).sum())?;
+        self.take_for(root, root.keys.iter().map(|key| 300 + key.key.len()).sum(), 1)?;
         root.children.iter().try_for_each(|child| self.take_document(child))
     }
 }
@@ -115,8 +133,15 @@ impl Room {
 pub(crate) type Resolve<'a> = dyn Fn(&str) -> Result<String, String> + 'a;
 
 /// Parses `text` and expands its includes with `resolve`. `name` is the file's name for messages.
-pub(crate) fn parse(text: &str, name: &str, resolve: &Resolve, room: &Room) -> Result<Element, MjcfError> {
-    let mut loader = Loader { resolve, room, included: BTreeSet::new() };
+/// `folder` is its folder relative to the main file, empty or with a slash at the end.
+pub(crate) fn parse(
+    text: &str,
+    name: &str,
+    folder: &str,
+    resolve: &Resolve,
+    room: &Room,
+) -> Result<Element, MjcfError> {
+    let mut loader = Loader { folder, resolve, room, included: BTreeSet::new() };
     let root = loader.file(text, name, "", 0)?;
     if root.name != "mujoco" {
         let found = shorten(&root.name);
@@ -126,48 +151,8 @@ pub(crate) fn parse(text: &str, name: &str, resolve: &Resolve, room: &Room) -> R
     Ok(root)
 }
 
-/// The text with spaces for the dashes inside comments: MuJoCo's parser takes "--" there, which XML forbids.
-fn without_dashes_in_comments(text: &str) -> Cow<'_, str> {
-    let mut out = Cow::Borrowed(text);
-    let mut at = 0;
-    while let Some(start) = text[at..].find("<!--").map(|i| at + i + 4) {
-        let end = text[start..].find("-->").map_or(text.len(), |i| start + i);
-        if text[start..end].contains("--") || text[start..end].ends_with('-') {
-            out.to_mut().replace_range(start..end, &text[start..end].replace('-', " "));
-        }
-        at = end;
-    }
-    out
-}
-
-/// Line of the first start tag with too many attributes, if any.
-fn crowded_tag(text: &str) -> Option<usize> {
-    let bytes = text.as_bytes();
-    let find = |from: usize, end: &str| text[from..].find(end).map_or(bytes.len(), |i| from + i + end.len());
-    let mut at = 0;
-    while let Some(start) = bytes[at..].iter().position(|b| *b == b'<').map(|i| at + i) {
-        at = start + 1;
-        let skipped = [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")];
-        if let Some((_, end)) = skipped.iter().find(|(begin, _)| bytes[start..].starts_with(begin.as_bytes())) {
-            at = find(start, end);
-            continue;
-        }
-        let mut values = 0;
-        while let Some(&byte) = bytes.get(at).filter(|b| **b != b'>') {
-            at += 1;
-            if byte == b'"' || byte == b'\'' {
-                values += 1;
-                at = bytes[at..].iter().position(|b| *b == byte).map_or(bytes.len(), |i| at + i + 1);
-            }
-        }
-        if values > MAX_ATTRIBUTES {
-            return Some(1 + bytes[..start].iter().filter(|b| **b == b'\n').count());
-        }
-    }
-    None
-}
-
 struct Loader<'a> {
+    folder: &'a str,
     resolve: &'a Resolve<'a>,
     room: &'a Room,
     included: BTreeSet<String>,
@@ -178,13 +163,11 @@ impl Loader<'_> {
     fn file(&mut self, text: &str, name: &str, dir: &str, depth: usize) -> Result<Element, MjcfError> {
         let file: Arc<str> = name.into();
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        let text = &*without_dashes_in_comments(text);
         // no DTD, hence no entity bombs; the parser itself does not recurse over elements
-        if let Some(line) = crowded_tag(text) {
+        let text = &*xml::repaired(text).map_err(|line| {
             let place = Place { file: file.clone(), line };
-            let message = format!("an element has more than {MAX_ATTRIBUTES} attributes");
-            return Err(place.error(MjcfErrorKind::Syntax(message)));
-        }
+            place.error(MjcfErrorKind::Syntax(format!("an element has more than {MAX_ATTRIBUTES} attributes")))
+        })?;
         let options = roxmltree::ParsingOptions { nodes_limit: MAX_NODES, ..Default::default() };
         let document = roxmltree::Document::parse_with_options(text, options).map_err(|error| {
             let place = Place { file: file.clone(), line: error.pos().row as usize };
@@ -213,6 +196,8 @@ impl Loader<'_> {
                 .collect(),
             children: Vec::new(),
             place: place(node.range().start),
+            settings: None,
+            keys: Vec::new(),
         };
         self.room.take_element(&element, node.attributes().len(), node.attributes().map(|a| a.value().len()).sum())?;
         if depth >= MAX_DEPTH {
@@ -250,11 +235,12 @@ impl Loader<'_> {
         }
         // relative to the main file, else to the including one
         let path = normalize(&attr.value);
-        let (path, text) = match (self.resolve)(&path) {
+        let read = |path: &str| (self.resolve)(&normalize(&join(self.folder, path)));
+        let (path, text) = match read(&path) {
             Ok(text) => (path, text),
             Err(reason) => {
                 let local = normalize(&join(dir, &attr.value));
-                let text = (self.resolve)(&local).map_err(|_| {
+                let text = read(&local).map_err(|_| {
                     let message = format!("included file '{}': {reason}", shorten(&path));
                     attr.place.error(MjcfErrorKind::Read(message))
                 })?;
@@ -265,7 +251,7 @@ impl Loader<'_> {
             return Err(include.invalid(format!("the file '{}' is already included", shorten(&path))));
         }
         let dir = path.rfind('/').map_or("", |end| &path[..=end]);
-        let root = self.file(&text, &path, dir, depth)?;
+        let root = self.file(&text, &join(self.folder, &path), dir, depth)?;
         if root.children.is_empty() {
             return Err(include.invalid(format!("the file '{}' contains no elements", shorten(&path))));
         }
@@ -274,12 +260,12 @@ impl Loader<'_> {
 }
 
 /// `path` seen from `dir`, which is empty or ends with a slash.
-fn join(dir: &str, path: &str) -> String {
+pub(crate) fn join(dir: &str, path: &str) -> String {
     if path.starts_with('/') { path.to_owned() } else { format!("{dir}{path}") }
 }
 
 /// Removes `.` and resolvable `..` parts, so that one file has one name.
-fn normalize(path: &str) -> String {
+pub(crate) fn normalize(path: &str) -> String {
     let mut parts: Vec<&str> = Vec::new();
     for part in path.split(['/', '\\']) {
         match part {

@@ -344,7 +344,7 @@ fn on_mesh(
         let shown = ShownMesh { mesh: index, volume: solid.volume, inertia_box: solid.inertia_box };
         return Ok((local.compose(&solid.frame), Some(shown)));
     }
-    let Some(center) = solid.fit(kind, settings.fitaabb, size) else {
+    let Some(center) = solid.fit(kind, settings.of(attrs.element).fitaabb, size) else {
         let message = "a mesh can be fitted by a sphere, capsule, cylinder, ellipsoid or box, not by this type";
         return Err(attrs.element.invalid(message));
     };

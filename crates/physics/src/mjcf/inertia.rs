@@ -12,15 +12,16 @@ pub(crate) fn compile(bodies: &mut [BodySpec], settings: &Settings) -> Result<()
         if let Some(inertial) = &body.inertial {
             (body.mass, body.iframe, body.inertia) = (inertial.mass, inertial.frame, inertial.moments);
         }
-        let infer = match settings.inertiafromgeom {
+        let own = settings.of(body.element);
+        let infer = match own.inertiafromgeom {
             Tristate::True => true,
             Tristate::False => false,
             Tristate::Auto => body.inertial.is_none(),
         };
         if infer {
-            from_geoms(body, settings)?;
+            from_geoms(body, own)?;
         }
-        check(body, settings)?;
+        check(body, own)?;
     }
     check_moving(bodies)?;
     let total: f64 = bodies.iter().map(|b| b.mass).sum();

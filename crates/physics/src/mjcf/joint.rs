@@ -78,6 +78,7 @@ impl JointSpec<'_> {
 
     /// `<joint>` with its defaults; `frame` is that of enclosing `<frame>` elements.
     pub fn read<'a>(attrs: &Attrs<'a>, frame: &Frame, settings: &Settings) -> Result<JointSpec<'a>, MjcfError> {
+        let settings = settings.of(attrs.element);
         let element = attrs.element;
         let kind = attrs.keyword("type", &TYPES)?.unwrap_or(JointType::Hinge);
         let scalar = matches!(kind, JointType::Hinge | JointType::Slide);

@@ -22,7 +22,7 @@ pub(crate) fn check_switch(
     settings: &Settings,
 ) -> Result<(), MjcfError> {
     let given = range[0] != 0.0 || range[1] != 0.0;
-    if attrs.tristate(switch)? == Tristate::Auto && given && !settings.autolimits {
+    if attrs.tristate(switch)? == Tristate::Auto && given && !settings.of(attrs.element).autolimits {
         let message = format!("there is '{name}' but not '{switch}', and the compiler's autolimits is false");
         return Err(attrs.element.invalid(message));
     }

@@ -129,7 +129,7 @@ fn content(attrs: &Attrs, settings: &Settings, file: &ReadFile, room: &Room) -> 
 /// The mesh of a file, or the error that the file is missing.
 fn from_file(attrs: &Attrs, settings: &Settings, read: &ReadFile) -> Result<Result<Triangles, MjcfError>, MjcfError> {
     let Some((_, attr)) = attrs.find("file") else { return Err(attrs.element.invalid("'file' is missing")) };
-    let path = settings.asset_path(&attr.value);
+    let path = settings.of(attrs.element).asset_path(&attr.value);
     let failed = |reason: String| attr.place.error(MjcfErrorKind::Read(format!("mesh file '{path}': {reason}")));
     let format = Format::of(&path, attrs.text("content_type")).map_err(failed);
     let bytes = match read(&path) {

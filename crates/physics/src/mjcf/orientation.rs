@@ -13,6 +13,7 @@ const SPECIFIERS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes", "zaxis"];
 ///
 /// One element may use one of them; an element's own replaces that of its class.
 pub(crate) fn orientation(attrs: &Attrs, settings: &Settings) -> Result<Option<Quat>, MjcfError> {
+    let settings = settings.of(attrs.element);
     for element in attrs.chain() {
         let given: Vec<&str> = SPECIFIERS.into_iter().filter(|s| element.attr(s).is_some()).collect();
         if given.len() > 1 {
@@ -59,6 +60,11 @@ fn read(element: &Element, specifier: &str, settings: &Settings) -> Result<Quat,
 
 /// Rotation by three angles of the file, about the axes of `eulerseq`.
 pub(crate) fn from_euler(angles: Vec3, settings: &Settings) -> Quat {
+    normalized(euler_product(angles, settings))
+}
+
+/// The same before it gets the length 1.
+pub(crate) fn euler_product(angles: Vec3, settings: &Settings) -> Quat {
     let mut quat = IDENTITY;
     for (turn, angle) in settings.eulerseq.iter().zip(angles) {
         let mut axis = [0.0; 3];
@@ -67,5 +73,5 @@ pub(crate) fn from_euler(angles: Vec3, settings: &Settings) -> Quat {
         // rotating axes multiply from the right, fixed axes from the left
         quat = if turn.fixed { mul_quat(step, quat) } else { mul_quat(quat, step) };
     }
-    normalized(quat)
+    quat
 }

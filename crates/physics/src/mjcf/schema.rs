@@ -60,6 +60,8 @@ const fn world_like(rule: Rule) -> Rule {
     Rule { inside: Inside::Bodies, ..rule }
 }
 
+/// Attribute of bodies that [`ModelSpec::to_xml`](super::spec::ModelSpec::to_xml) writes where MJCF cannot say how their mass is found.
+pub(crate) const OTHER_MASS: &str = "masses";
 const NO_PLUGIN: Rule = refused("plugin", "plugins are not supported");
 const EXPAND: &str = "this engine does not expand models; save the expanded model from MuJoCo and load that";
 const NO_FLEX: &str = "deformable bodies are not supported";
@@ -86,7 +88,7 @@ const TOP: &[Rule] = &[
             "timestep gravity density viscosity wind magnetic integrator cone impratio iterations ls_iterations \
              ls_tolerance tolerance noslip_iterations noslip_tolerance ccd_iterations ccd_tolerance solver jacobian \
              o_margin o_solref o_solimp o_friction",
-            // each of these has an effect only together with something that is refused
+            // each of these has an effect only together with something that is refused, or that bodies do not do: sleep
             "sdf_initpoints sdf_iterations sleep_tolerance",
             "actuatorgroupdisable",
         ),
@@ -94,8 +96,8 @@ const TOP: &[Rule] = &[
             "flag",
             "constraint equality limit contact frictionloss spring damper gravity clampctrl warmstart actuation \
              refsafe eulerdamp filterparent island midphase multiccd nativeccd override",
-            "autoreset energy fwdinv invdiscrete",
-            "sensor=enable sleep=disable diagexact=disable ipc=disable \
+            "autoreset energy fwdinv invdiscrete sleep",
+            "sensor=enable diagexact=disable ipc=disable \
              speculative=disable",
         )],
     ),
@@ -170,7 +172,7 @@ const ASSET: &[Rule] = &[
     ),
     rule("hfield", "name nrow ncol size elevation file content_type", "", ""),
     anything("skin"),
-    anything("model"),
+    rule("model", "name file content_type", "", ""),
     rule(
         "texture",
         "name class",
@@ -192,9 +194,9 @@ const ASSET: &[Rule] = &[
 const BODY: &[Rule] = &[
     world_like(rule(
         "body",
-        "name childclass mocap gravcomp simple pos quat axisangle euler xyaxes zaxis",
-        "user fuse sleep",
-        "",
+        "name childclass mocap gravcomp simple sleep pos quat axisangle euler xyaxes zaxis",
+        "user fuse",
+        OTHER_MASS,
     )),
     world_like(rule(
         "frame",
@@ -243,7 +245,7 @@ const BODY: &[Rule] = &[
         "",
     ),
     NO_PLUGIN,
-    refused("attach", EXPAND),
+    ATTACH,
     REPLICATE,
     refused("composite", EXPAND),
     refused("flexcomp", NO_FLEX),
@@ -423,9 +425,16 @@ const CUSTOM: &[Rule] = &[
 /// It is expanded before the rest of the model is checked. MuJoCo 4 accepts a prefix and does not use it.
 const REPLICATE: Rule = world_like(rule("replicate", "count offset euler sep childclass", "prefix", ""));
 
-/// Checks the names of the attributes of a `<replicate>`.
-pub(crate) fn check_replicate(element: &Element) -> Result<(), MjcfError> {
-    attributes(element, &REPLICATE, "")
+/// It is expanded as well.
+const ATTACH: Rule = rule("attach", "model body frame prefix", "", "");
+
+/// Checks the names of the attributes of a `<replicate>`, an `<attach>` or a `<model>`, which are gone when the rest is checked.
+pub(crate) fn check_expanded(element: &Element) -> Result<(), MjcfError> {
+    let rules = [&REPLICATE, &ATTACH].into_iter().chain(ASSET);
+    match rules.into_iter().find(|rule| rule.name == element.name) {
+        Some(rule) => attributes(element, rule, ""),
+        None => Ok(()),
+    }
 }
 
 /// Checks the names of all elements and attributes.

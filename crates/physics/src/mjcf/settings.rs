@@ -8,7 +8,7 @@ use super::value::{Attrs, Tristate};
 use crate::model::{Cone, ContactOverride, Flags, Integrator, Options, Solver, Vec3};
 
 /// One of the three Euler rotations.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Turn {
     /// 0, 1, 2 for x, y, z.
     pub axis: usize,
@@ -32,15 +32,32 @@ pub(crate) struct Settings {
     pub meshdir: String,
     /// The medium has density or viscosity.
     pub medium: bool,
+    /// Bodies at rest may fall asleep in MuJoCo.
+    pub sleep: bool,
     /// Files are looked up by their last path component.
     pub strippath: bool,
     /// Primitives are fitted to the bounding box of a mesh instead of its inertia.
     pub fitaabb: bool,
     /// Where the ranges of the lengths of muscles are from.
     pub lengthrange: LengthRange,
+    /// Folder of the model's file, relative to the model that it is attached to; empty or with a slash at the end.
+    pub folder: String,
 }
 
 impl Settings {
+    /// The settings for an element: its own ones if it was attached from another model.
+    pub fn of<'s>(&'s self, element: &'s Element) -> &'s Settings {
+        element.settings.as_deref().unwrap_or(self)
+    }
+
+    /// Whether bodies have the same masses as with other settings.
+    pub fn gives_masses_like(&self, other: &Settings) -> bool {
+        let masses = |s: &Settings| {
+            (s.boundmass, s.boundinertia, s.balanceinertia, s.inertiafromgeom, s.inertiagrouprange, s.fitaabb)
+        };
+        masses(self) == masses(other)
+    }
+
     /// The angle in radians.
     pub fn angle(&self, given: f64) -> f64 {
         if self.degree { given * std::f64::consts::PI / 180.0 } else { given }
@@ -49,10 +66,14 @@ impl Settings {
     /// Path of a mesh or height field file, relative to the model.
     pub fn asset_path(&self, file: &str) -> String {
         let file = if self.strippath { file.rsplit(['/', '\\']).next().unwrap_or(file) } else { file };
-        if self.meshdir.is_empty() || file.starts_with('/') {
+        if file.starts_with('/') {
             return file.to_owned();
         }
-        format!("{}/{file}", self.meshdir.trim_end_matches(['/', '\\']))
+        let folder = if self.meshdir.starts_with('/') { "" } else { &self.folder };
+        match self.meshdir.trim_end_matches(['/', '\\']) {
+            _ if self.meshdir.is_empty() => format!("{folder}{file}"),
+            meshdir => format!("{folder}{meshdir}/{file}"),
+        }
     }
 
     /// Reads all `<compiler>` sections; of an attribute given several times the last counts.
@@ -69,9 +90,11 @@ impl Settings {
             inertiagrouprange: [0, 5],
             meshdir: String::new(),
             medium: false,
+            sleep: false,
             strippath: false,
             fitaabb: false,
             lengthrange: LengthRange::DEFAULT,
+            folder: String::new(),
         };
         for element in sections(root, "compiler") {
             settings.section(element)?;
@@ -250,6 +273,11 @@ fn option(element: &Element, opt: &mut Options, given: &mut ContactOverride) -> 
     opt.solver = attrs.keyword("solver", &solvers)?.unwrap_or(opt.solver);
     attrs.keyword("jacobian", &[("dense", ()), ("sparse", ()), ("auto", ())])?;
     Ok(())
+}
+
+/// Whether bodies at rest fall asleep in MuJoCo.
+pub(crate) fn sleep(root: &Element) -> bool {
+    entries(root, "option").filter_map(|flag| flag.text("sleep")).last() == Some("enable")
 }
 
 /// Reads `<flag>`; returns whether the contact override is on, if the element says so.

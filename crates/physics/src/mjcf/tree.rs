@@ -206,6 +206,25 @@ impl<'a> Reader<'a, '_> {
         if dofs > 6 {
             return Err(element.invalid(format!("the joints of a body have at most 6 degrees of freedom, not {dofs}")));
         }
+        self.sleep(&attrs, index)
+    }
+
+    /// Checks the policy of sleep. Every policy simulates the body, but for the one that starts asleep.
+    fn sleep(&self, attrs: &Attrs, body: usize) -> Result<(), MjcfError> {
+        let element = attrs.element;
+        let policies = ["auto", "never", "allowed", "init"].map(|policy| (policy, policy));
+        let policy = attrs.keyword("sleep", &policies)?.unwrap_or("auto");
+        let moves = |body: usize| !self.bodies[body].joints.is_empty();
+        let mut above =
+            std::iter::successors(Some(self.bodies[body].parent), |b| (*b > 0).then(|| self.bodies[*b].parent));
+        if policy != "auto" && (!moves(body) || above.any(moves)) {
+            let message = "'sleep' belongs to a body with joints that is in no other body with joints";
+            return Err(element.invalid(message));
+        }
+        if policy == "init" && self.settings.sleep {
+            let reason = "'init' is not supported: the body would start asleep; use 'auto', 'allowed' or 'never'";
+            return Err(element.unsupported(Some("sleep"), reason));
+        }
         Ok(())
     }
 

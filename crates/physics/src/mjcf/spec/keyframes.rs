@@ -2,7 +2,7 @@
 
 use super::super::actuator_params::ActuatorParams;
 use super::super::defaults::Defaults;
-use super::super::document::Element;
+use super::super::document::{Element, LISTS};
 use super::super::error::MjcfError;
 use super::super::joint::JointSpec;
 use super::super::math::{Frame, IDENTITY};
@@ -13,15 +13,12 @@ use super::super::value::Attrs;
 use super::walk::Path;
 use crate::model::{Dynamics, JointType};
 
-/// Lists of a key. Each holds the numbers of all joints, actuators or mocap bodies in their order.
-const LISTS: [&str; 6] = ["qpos", "qvel", "act", "ctrl", "mpos", "mquat"];
-
 /// The part of each list that belongs to one element and what it holds: where it begins, and its values at rest.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Share([(usize, Vec<f64>); LISTS.len()]);
 
 /// The numbers that one element adds to each list.
-type Values = [Vec<f64>; LISTS.len()];
+pub(super) type Values = [Vec<f64>; LISTS.len()];
 
 impl Share {
     /// The share of the element at a path; an empty one if the model has no keyframes.
@@ -30,15 +27,12 @@ impl Share {
         if sections(root, "keyframe").all(|section| section.children.is_empty()) {
             return Ok(share);
         }
-        let room = Room::default();
-        let defaults = Defaults::read(root, &room)?;
-        let mut reader = Reader { defaults: &defaults, settings: Settings::read(root)?, values: Vec::new() };
-        reader.model(root)?;
-        let first = reader.values.iter().position(|(at, _)| at.starts_with(path)).unwrap_or(reader.values.len());
-        for (_, values) in &reader.values[..first] {
+        let all = at_rest(root, &Room::default())?;
+        let first = all.iter().position(|(at, _)| at.starts_with(path)).unwrap_or(all.len());
+        for (_, values) in &all[..first] {
             share.0.iter_mut().zip(values).for_each(|((start, _), more)| *start += more.len());
         }
-        for (_, values) in reader.values[first..].iter().filter(|(at, _)| at.starts_with(path)) {
+        for (_, values) in all[first..].iter().filter(|(at, _)| at.starts_with(path)) {
             share.0.iter_mut().zip(values).for_each(|((_, own), more)| own.extend(more));
         }
         Ok(share)
@@ -48,6 +42,14 @@ impl Share {
     pub fn emptied(&self) -> Share {
         Share(self.0.each_ref().map(|(start, _)| (*start, Vec::new())))
     }
+}
+
+/// What each joint, mocap body and actuator adds to the lists, in their order.
+pub(super) fn at_rest(root: &Element, room: &Room) -> Result<Vec<(Path, Values)>, MjcfError> {
+    let defaults = Defaults::read(root, room)?;
+    let mut reader = Reader { defaults: &defaults, settings: Settings::read(root)?, values: Vec::new() };
+    reader.model(root)?;
+    Ok(reader.values)
 }
 
 /// Puts the new share of an element in place of its old one, in every key. A share of the same size keeps its numbers.

@@ -29,16 +29,19 @@
 //! * Names of attributes are checked at once, their values by [`ModelSpec::compile`], which also keeps to the
 //!   [budget](crate::budget).
 //! * Keyframes keep their meaning: the numbers of a joint, mocap body or actuator come and go with it.
-//! * `<replicate>` is expanded when the model is read: its copies are in `<frame>` elements.
+//! * `<replicate>` and `<attach>` are expanded when the model is read: the copies are in `<frame>` elements.
 //! * [`ModelSpec::to_xml`] writes the model as MJCF. It compiles to the same bits.
 
+mod attach;
 mod body_parts;
 mod element;
+mod expand;
 mod keyframes;
 mod kind;
 mod model_parts;
 mod obstacles;
 mod part;
+mod portable;
 mod references;
 mod replicate;
 mod value;
@@ -59,6 +62,7 @@ use super::room::Room;
 use super::{assemble, schema};
 use crate::hint::nearest;
 use crate::model::Model;
+use attach::Library;
 use keyframes::Share;
 use kind::WORLD;
 use references::Gone;
@@ -119,8 +123,10 @@ impl ModelSpec {
         resolve: &dyn Fn(&str) -> Result<Vec<u8>, String>,
     ) -> Result<ModelSpec, MjcfError> {
         let room = Room::default();
-        let mut root = document::parse(xml, name, &|file| super::utf8(resolve(file)?), &room)?;
-        replicate::expand(&mut root, &room)?;
+        let library = Library::new(resolve, &room);
+        let mut root = document::parse(xml, name, "", &|file| super::utf8(resolve(file)?), &room)?;
+        let keys = expand::expand(&mut root, "", &library)?;
+        attach::write_keys(&mut root, &keys, &room)?;
         Ok(ModelSpec { root, folder: None }.with_world())
     }
 
@@ -149,10 +155,11 @@ impl ModelSpec {
         assemble::compile(&self.root, read, &room)
     }
 
-    /// The model as MJCF, with its includes and without comments. It names mesh and height field files as the model does, relative
-    /// to the model's folder.
+    /// The model as MJCF, with its includes and attached parts and without comments. It names mesh and height field files as the model does,
+    /// relative to the model's folder. Bodies attached from a model whose compiler gives masses in another way have the attribute
+    /// `masses`, which readers refuse: MJCF cannot say this in one file.
     pub fn to_xml(&self) -> String {
-        write::text(&self.root)
+        write::text(&portable::portable(&self.root))
     }
 
     /// All elements of a kind, in the order of the file. The world is not among the bodies.
@@ -302,11 +309,7 @@ impl ModelSpec {
 
     /// Index of the last section of a name. The model gets one if it has none.
     fn section(&mut self, name: &str) -> usize {
-        let sections = &mut self.root.children;
-        sections.iter().rposition(|section| section.name == name).unwrap_or_else(|| {
-            sections.push(part::Draft::new(name).placed(&self.root.place));
-            sections.len() - 1
-        })
+        last_section(&mut self.root, name)
     }
 
     /// The way to the element of a kind and a name.
@@ -414,6 +417,15 @@ impl ModelSpec {
         labels.extend(references::leave_tuples(&mut self.root, &gone));
         Ok(labels)
     }
+}
+
+/// Index of the last section of a name, which must not be that of an attached model. The model gets one if it has none.
+fn last_section(root: &mut Element, name: &str) -> usize {
+    let own = |section: &Element| section.name == name && section.settings.is_none();
+    root.children.iter().rposition(own).unwrap_or_else(|| {
+        root.children.push(part::Draft::new(name).placed(&root.place));
+        root.children.len() - 1
+    })
 }
 
 fn no_files(_: &str) -> Result<Vec<u8>, String> {

@@ -31,7 +31,14 @@ pub struct Draft(Element);
 impl Draft {
     pub(super) fn new(tag: &str) -> Draft {
         let place = Place { file: "".into(), line: 0 };
-        Draft(Element { name: tag.to_owned(), attrs: Vec::new(), children: Vec::new(), place })
+        Draft(Element {
+            name: tag.to_owned(),
+            attrs: Vec::new(),
+            children: Vec::new(),
+            place,
+            settings: None,
+            keys: Vec::new(),
+        })
     }
 
     pub(super) fn with(mut self, attribute: &str, value: impl Into<AttrValue>) -> Draft {

@@ -12,7 +12,7 @@ const SECTIONS: [&str; 7] = ["worldbody", "contact", "tendon", "equality", "actu
 pub(super) type Gone = BTreeSet<(Kind, String)>;
 
 /// The kind of element that an attribute names.
-fn target(element: &Element, attr: &Attr) -> Option<Kind> {
+pub(super) fn target(element: &Element, attr: &Attr) -> Option<Kind> {
     let by_type = |attribute: &str| match element.text(attribute)? {
         "body" | "xbody" => Some(Kind::Body),
         "joint" => Some(Kind::Joint),
@@ -100,6 +100,11 @@ pub(super) fn leave_tuples(root: &mut Element, gone: &Gone) -> Vec<String> {
 pub(super) fn is_any_to(element: &Element, names: &Gone) -> bool {
     element.attrs.iter().any(|attr| is_one_of(names, element, attr))
         || element.children.iter().any(|part| is_any_to(part, names))
+}
+
+/// Whether an element refers to anything.
+pub(super) fn are_any(element: &Element) -> bool {
+    element.attrs.iter().any(|attr| target(element, attr).is_some()) || element.children.iter().any(are_any)
 }
 
 /// Whether an element refers to those names, and to nothing else but the world.

@@ -2,76 +2,38 @@
 //!
 //! The rules are MuJoCo's. Names in a copy get `sep` and the copy's number. Elements of other sections may refer to things in
 //! the `<replicate>`. They are copied, too, behind the other elements of their section. Constraints and actuators must refer to nothing
-//! else but the world; MuJoCo leaves out those that do.
+//! else but the world; MuJoCo leaves out those that do. Sensors that refer to nothing are copied with each copy, even those that are
+//! copies themselves.
 
 use super::super::document::Element;
 use super::super::error::MjcfError;
 use super::super::math::{add, rotate, scale};
 use super::super::orientation::from_euler;
-use super::super::room::Room;
 use super::super::schema;
-use super::super::settings::Settings;
 use super::super::value::Attrs;
-use super::kind::Kind;
+use super::attach::forget_keys;
+use super::expand::{Expansion, FOLLOWERS, named};
 use super::part::{Draft, set};
 use super::references::{self, Gone};
+use super::walk;
 
-/// Sections whose elements are copied. Each refers to earlier ones only.
-const FOLLOWERS: [&str; 6] = ["contact", "tendon", "equality", "actuator", "sensor", "custom"];
-/// Those whose elements may refer to other things as well.
+/// Sections whose elements may refer to other things as well.
 const MIXED: [&str; 3] = ["contact", "tendon", "sensor"];
 /// Parts of a body that cannot stand in a frame.
 const NOT_IN_FRAMES: [&str; 3] = ["joint", "freejoint", "inertial"];
-/// Elements that may be looked at; bounds the time that nested copies take.
-const MOST_LOOKS: usize = 20_000_000;
-
-/// Replaces every `<replicate>` of a document by its copies.
-pub(super) fn expand(root: &mut Element, room: &Room) -> Result<(), MjcfError> {
-    let is_world = |section: &Element| section.name == "worldbody";
-    if !root.children.iter().any(|section| is_world(section) && holds_one(section)) {
-        return Ok(());
-    }
-    let mut expansion = Expansion { settings: Settings::read(root)?, sections: Vec::new(), room, looks: 0 };
-    expansion.sections = std::mem::take(&mut root.children);
-    for i in 0..expansion.sections.len() {
-        if is_world(&expansion.sections[i]) {
-            let world = std::mem::take(&mut expansion.sections[i].children);
-            expansion.sections[i].children = expansion.expanded(world)?;
-        }
-    }
-    root.children = expansion.sections;
-    Ok(())
-}
-
-fn holds_one(element: &Element) -> bool {
-    element.children.iter().any(|child| child.name == "replicate" || holds_one(child))
-}
-
-struct Expansion<'a> {
-    settings: Settings,
-    sections: Vec<Element>,
-    room: &'a Room,
-    looks: usize,
-}
 
 impl Expansion<'_> {
-    /// Parts of a body after expansion, from the inside outward.
-    fn expanded(&mut self, parts: Vec<Element>) -> Result<Vec<Element>, MjcfError> {
-        let mut out = Vec::with_capacity(parts.len());
-        for mut part in parts {
-            let inside = std::mem::take(&mut part.children);
-            part.children = self.expanded(inside)?;
-            if part.name == "replicate" {
-                out.extend(self.copies(&part)?);
-            } else {
-                out.push(part);
-            }
-        }
-        Ok(out)
+    /// Puts copies in the place of the `<replicate>` with this index among the parts of an element. Returns their number.
+    pub fn replicate(&mut self, parent: &[usize], index: usize) -> Result<usize, MjcfError> {
+        let replicate = walk::at_mut(self.root, parent).children.remove(index);
+        let copies = self.copies(&replicate)?;
+        let count = copies.len();
+        walk::at_mut(self.root, parent).children.splice(index..index, copies);
+        Ok(count)
     }
 
     fn copies(&mut self, replicate: &Element) -> Result<Vec<Element>, MjcfError> {
-        schema::check_replicate(replicate)?;
+        schema::check_expanded(replicate)?;
         let attrs = Attrs::plain(replicate);
         if !attrs.has("count") {
             return Err(replicate.invalid("the attribute 'count' is missing"));
@@ -95,62 +57,62 @@ impl Expansion<'_> {
             frame.attrs.extend(replicate.attr("childclass").cloned());
             set(&mut frame, "pos", pos.into());
             set(&mut frame, "euler", turn.into());
-            self.room.take_document(&frame)?;
+            self.library.room.take_document(&frame)?;
             for child in &replicate.children {
-                self.room.take_document(child)?;
-                frame.children.push(references::numbered(child, &names, &suffix(i)));
+                self.library.room.take_document(child)?;
+                frame.children.push(numbered(child, &names, &suffix(i), i));
             }
             copies.push(frame);
             pos = add(pos, rotate(from_euler(turn, &self.settings), offset));
         }
-        self.follow(replicate, names, &(0..count).map(suffix).collect::<Vec<_>>())?;
+        let suffixes: Vec<String> = (0..count).map(suffix).collect();
+        for name in &names {
+            self.known.remove(name);
+            self.known.extend(suffixes.iter().map(|suffix| (name.0, format!("{}{suffix}", name.1))));
+        }
+        self.follow_copies(replicate, names, &suffixes)?;
         Ok(copies)
     }
 
-    /// Adds the names of an element of a body and of all that it holds.
-    fn collect(&mut self, element: &Element, names: &mut Gone) -> Result<(), MjcfError> {
-        self.look(element, 1)?;
-        let kind = Kind::of("worldbody", &element.name);
-        names.extend(kind.and_then(|kind| Some((kind, kind.name(element)?.to_owned()))));
-        element.children.iter().try_for_each(|child| self.collect(child, names))
-    }
-
     /// Copies the elements of other sections that refer to these names.
-    fn follow(&mut self, replicate: &Element, mut names: Gone, suffixes: &[String]) -> Result<(), MjcfError> {
-        if names.is_empty() {
-            return Ok(());
-        }
+    fn follow_copies(&mut self, replicate: &Element, mut names: Gone, suffixes: &[String]) -> Result<(), MjcfError> {
         for section in FOLLOWERS {
-            let Some(last) = self.sections.iter().rposition(|s| s.name == section) else { continue };
-            let elements: usize = self.sections.iter().filter(|s| s.name == section).map(|s| s.children.len()).sum();
-            self.look(replicate, elements)?;
-            let follows = if MIXED.contains(&section) { references::is_any_to } else { references::are_all_to };
-            let mut found = Vec::new();
-            for section in self.sections.iter_mut().filter(|s| s.name == section) {
-                found.extend(section.children.extract_if(.., |element| follows(element, &names)));
+            let sections = || self.root.children.iter().filter(|s| s.name == section);
+            let elements: usize = sections().map(|s| s.children.len()).sum();
+            if elements == 0 {
+                continue;
             }
-            let named = |element: &Element| {
-                let kind = Kind::of(section, &element.name)?;
-                Some((kind, kind.name(element)?.to_owned()))
-            };
-            names.extend(found.iter().filter_map(named));
-            for suffix in suffixes {
-                for element in &found {
-                    self.room.take_document(element)?;
-                    self.sections[last].children.push(references::numbered(element, &names, suffix));
+            self.library.look(replicate, elements)?;
+            let follows = if MIXED.contains(&section) { references::is_any_to } else { references::are_all_to };
+            let alone = |element: &Element| section == "sensor" && !references::are_any(element);
+            let mut found = Vec::new();
+            for section in self.root.children.iter_mut().filter(|s| s.name == section) {
+                found.extend(section.children.iter().filter(|e| follows(e, &names) || alone(e)).cloned());
+                section.children.retain(|element| !follows(element, &names));
+            }
+            names.extend(found.iter().filter(|e| !alone(e)).filter_map(|element| named(section, element)));
+            let last = self.section(section);
+            for (i, suffix) in suffixes.iter().enumerate() {
+                for j in 0..found.len() {
+                    self.library.room.take_document(&found[j])?;
+                    let copy = numbered(&found[j], &names, suffix, i);
+                    self.known.extend(named(section, &copy));
+                    if alone(&copy) {
+                        found.push(copy.clone());
+                    }
+                    self.root.children[last].children.push(copy);
                 }
             }
         }
         Ok(())
     }
+}
 
-    fn look(&mut self, element: &Element, count: usize) -> Result<(), MjcfError> {
-        self.looks = self.looks.saturating_add(count);
-        if self.looks > MOST_LOOKS {
-            return Err(
-                element.invalid(format!("to expand it takes more than {MOST_LOOKS} steps; expected fewer copies"))
-            );
-        }
-        Ok(())
+/// A numbered copy. As in MuJoCo, only the first one keeps the numbers of keyframes.
+fn numbered(element: &Element, names: &Gone, suffix: &str, index: usize) -> Element {
+    let mut copy = references::numbered(element, names, suffix);
+    if index > 0 {
+        forget_keys(&mut copy);
     }
+    copy
 }
