@@ -134,7 +134,18 @@ def geom(m, i):
         "solmix": m.geom_solmix[i], "solref": m.geom_solref[i], "solimp": m.geom_solimp[i],
         "margin": m.geom_margin[i], "gap": m.geom_gap[i], "rgba": color(m, m.geom_rgba[i], material),
         "material": name(m, mujoco.mjtObj.mjOBJ_MATERIAL, material) if material >= 0 else "none",
-        "group": m.geom_group[i],
+        "group": m.geom_group[i], "fluid": fluid(m, i),
+    }
+
+
+def fluid(m, i):
+    """Coefficients of the medium's forces on a geom."""
+    on, *drag_and_lift = m.geom_fluid[i][:6]
+    if not on:
+        return "none"
+    return {
+        "drag": drag_and_lift[:3], "lift": drag_and_lift[3:], "virtual_mass": m.geom_fluid[i][6:9],
+        "virtual_inertia": m.geom_fluid[i][9:12],
     }
 
 

@@ -34,6 +34,9 @@ class Generator:
         self.rng = np.random.default_rng([2026, seed])
         # the solver's caps use a separate random stream, because low caps were added later
         self.caps = np.random.default_rng([2029, seed])
+        # so do features that were added later still
+        self.late = np.random.default_rng([2035, seed])
+        self.path, self.moved_by = [], {}
         self.count = {}
         self.joints, self.bodies, self.geoms, self.sites, self.tendons, self.actuators = [], [], [], [], [], []
         self.limited, self.limited_tendons = set(), set()
@@ -145,6 +148,9 @@ class Generator:
         if self.maybe(0.15):
             contype = conaffinity = 0
         out.update(contype=contype, conaffinity=conaffinity, **self.contact())
+        if moving and self.late.random() < 0.1:
+            out["fluidshape"] = "ellipsoid"
+            out["fluidcoef"] = self.late.uniform(0, 2, self.late.integers(1, 6)) if self.late.random() < 0.5 else None
         if moving:
             out["mass"] = self.maybe(0.4, lambda: self.log(0.05, 5))
             out["density"] = self.maybe(0.2, lambda: self.log(200, 3000)) if out["mass"] is None else None
@@ -157,6 +163,7 @@ class Generator:
         kind = self.pick("sphere", "capsule", "box", "cylinder", "ellipsoid")
         name = self.name("s")
         self.sites.append(name)
+        self.moved_by[name] = list(self.path)
         out = {"name": name, "type": kind, "size": self.size(kind), "pos": self.vector(0.1), **self.orientation(0.5)}
         return element("site", out)
 
@@ -168,6 +175,8 @@ class Generator:
     def joint(self, kind, name, place, heavy):
         """A joint; `place` counts those of its body, whose axes must differ; a `heavy` one has armature."""
         out = {"name": name, "type": kind}
+        self.moved_by[name] = list(self.path)
+        out["actuatorgravcomp"] = True if self.late.random() < 0.1 else None
         if kind in ("hinge", "slide"):
             axis = np.zeros(3)
             axis[place % 3] = self.pick(-1, 1)
@@ -235,6 +244,7 @@ class Generator:
         out["mocap"] = mocap or None
         out["gravcomp"] = self.maybe(0.12, lambda: self.pick(1, 0.5, self.u(-0.5, 1.5)))
         children = []
+        self.path.append(name if kinds else None)
         free = kinds == ["free"]
         if free and self.maybe(0.7):
             joint = self.name("j")
@@ -270,6 +280,7 @@ class Generator:
                 if self.left > 0:
                     self.left -= 1
                     children.append(self.body(depth + 1))
+        self.path.pop()
         return element("body", out, children)
 
     def world(self):
@@ -314,6 +325,26 @@ class Generator:
     def scalar_joints(self):
         return [n for n, k in self.joints if k in ("hinge", "slide")]
 
+    def tendon_armature(self, paths):
+        """Armature of a tendon, sometimes, if the bodies that it pulls do not branch; given the paths to them."""
+        if self.late.random() >= 0.2:
+            return None
+        ends = {path[-1]: [b for b in path if b] for path in paths if path}
+        for a in ends.values():
+            for b in ends.values():
+                if a != b[: len(a)] and b != a[: len(b)] and set(a) & set(b) & set(ends):
+                    return None
+        return float(np.exp(self.late.uniform(np.log(1e-3), np.log(0.5))))
+
+    def string_armature(self, sites):
+        """The same for a string through sites."""
+        pulled = []
+        for one, other in zip(sites, sites[1:]):
+            a, b = self.moved_by.get(one, []), self.moved_by.get(other, [])
+            common = len([1 for x, y in zip(a, b) if x == y])
+            pulled += [path[: k + 1] for path in (a, b) for k in range(common, len(path)) if path[k]]
+        return self.tendon_armature(pulled)
+
     def tendon_section(self):
         scalar, out = self.scalar_joints(), []
         if len(scalar) < 1 or not self.maybe(0.5):
@@ -335,6 +366,7 @@ class Generator:
             a["frictionloss"] = self.maybe(0.2, lambda: self.log(0.01, 1))
             if a["frictionloss"]:
                 a.update(self.solver("friction"))
+            a["armature"] = self.tendon_armature([self.moved_by[j] for j in chosen])
             terms = [element("joint", {"joint": j, "coef": self.u(-2, 2)}) for j in chosen]
             out.append(element("fixed", a, terms))
             self.tendons.append(name)
@@ -535,6 +567,10 @@ class Generator:
             out["density"] = self.maybe(0.7, lambda: self.log(1, 1000))
             out["viscosity"] = self.maybe(0.7, lambda: self.log(1e-5, 1))
             out["wind"] = self.maybe(0.5, lambda: self.vector(2.0))
+        if self.integrator != "RK4" and self.late.random() < 0.2:
+            out["integrator"] = "implicit"
+        if self.integrator == "implicitfast" and self.late.random() < 0.2:
+            out["density"], out["viscosity"] = self.late.uniform(0, 500), self.late.uniform(0, 0.5)
         if self.caps.random() < 0.3:
             out["iterations"], out["ls_iterations"] = self.caps.integers(1, 6), self.caps.integers(4, 11)
             out["solver"] = "CG" if self.caps.random() < 0.2 else None

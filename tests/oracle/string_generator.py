@@ -24,13 +24,14 @@ class Strings:
     def branch(self):
         """Sites, with a geom between some of them."""
         g = self.g
-        path, last = [], None
+        path, last, self.sites = [], None, []
         for _ in range(g.rng.integers(2, 5)):
             site = g.among([s for s in g.sites if s != last])[0]
             if last and self.round and g.maybe(0.4):
                 side = g.maybe(0.5, lambda: g.among(g.sites)[0])
                 path.append(self.element("geom", {"geom": g.among(self.round)[0], "sidesite": side}))
             path.append(self.element("site", {"site": site}))
+            self.sites.append(site)
             last = site
         return path
 
@@ -40,9 +41,13 @@ class Strings:
     def tendon(self):
         g = self.g
         path = (self.pulley() if g.maybe(0.1) else []) + self.branch()
+        single = True
         while g.maybe(0.25):
             path += self.pulley() + self.branch()
+            single = False
         a = {"name": g.name("s")}
+        if single and not any("<geom" in line for part in path for line in part):
+            a["armature"] = g.string_armature(self.sites)
         limited = g.maybe(0.35)
         if limited:
             a["range"] = [g.u(0, 0.3), g.u(0.4, 1.5)]

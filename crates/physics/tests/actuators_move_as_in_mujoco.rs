@@ -36,6 +36,26 @@ macro_rules! arms {
 
 const CASES: &[Case] = &[
     Case {
+        ctrl: &[0.5, -0.3],
+        qvel: &[1.0, -1.0, 2.0, 0.5, 0.2, -1.0, 1.0, -2.0, 0.3, 1.0, 2.0],
+        ..case(
+            "gravity compensation by actuators",
+            arms!(
+                r#"<body pos="1 0 0" gravcomp="1"><joint name="arm" axis="0 1 0" actuatorgravcomp="true" actuatorfrcrange="-0.5 0.2"/>
+                <geom type="capsule" size="0.03" fromto="0 0 0 0.3 0 0"/><body pos="0.3 0 0" gravcomp="0.7"><joint name="wrist" axis="0 1 0.3"/>
+                <geom type="capsule" size="0.03" fromto="0 0 0 0.2 0 0.1"/><body pos="0.2 0 0.1" gravcomp="-0.2"><joint type="ball" actuatorgravcomp="true"/>
+                <geom size="0.05" pos="0.05 0 0"/></body></body></body></worldbody><option integrator="implicit"/>
+                <actuator><motor joint="arm" gear="0.3"/><velocity joint="wrist" kv="0.1"/></actuator>
+                <sensor><jointactuatorfrc joint="arm"/><jointactuatorfrc joint="wrist"/></sensor>"#
+            ),
+        )
+    },
+    case(
+        "gravity compensation by actuators without actuators",
+        r#"<worldbody><body gravcomp="1"><joint axis="0 1 0" actuatorgravcomp="true"/><geom size="0.1" pos="0.2 0 0"/><body gravcomp="1" pos="0.3 0 0">
+        <joint axis="0 1 0"/><geom size="0.1" pos="0.2 0 0"/></body></body></worldbody>"#,
+    ),
+    Case {
         ctrl: &[0.5, -0.3, 0.8, 1.0],
         qvel: &[1.0, -1.0, 2.0, 0.5, 0.2, -1.0],
         ..case(

@@ -256,9 +256,6 @@ fn what_is_not_supported_together() {
     assert!(Model::from_xml_str(&shown, "good.xml").is_ok());
     let pair = shown.replace("<asset>", "<contact><pair geom1='g' geom2='m'/></contact><asset>");
     check(&pair, &["<pair>: geom 'm' collides, but the file of its mesh is missing"]);
-    let fish = with_section("<option density='1000'/>").replace("size=\"1\"", "size='1' fluidshape='ellipsoid'");
-    check(&fish, &["bad.xml:4:", "attribute 'fluidshape'", "only fluidshape=\"none\""]);
-    assert!(Model::from_xml_str(&fish.replace("1000", "0"), "good.xml").is_ok());
 }
 
 /// MuJoCo's rules for the paths of spatial tendons.

@@ -106,6 +106,81 @@ const CASES: &[Case] = &[
     },
     Case {
         qvel: &[3.0, 2.0, -3.0, 0.5, 0.2, -1.0],
+        ctrl: &[0.3],
+        ..case(
+            "armature with damped joints",
+            arms!(
+                r#"</worldbody><tendon><spatial armature="0.3" stiffness="20" damping="0.1"><site site="post"/><site site="h"/></spatial>
+                <spatial armature="0.1" frictionloss="0.2"><site site="r2"/><site site="peg"/><site site="r1"/></spatial>
+                <spatial name="two branches" armature="0.2"><site site="l"/><site site="r1"/></spatial>
+                <fixed name="f" armature="0.05" range="-0.1 0.3"><joint joint="turn" coef="0.5"/><joint joint="hand" coef="-2"/></fixed></tendon>
+                <actuator><motor tendon="f" armature="0.02" gear="2"/></actuator>
+                <sensor><e_kinetic/><e_potential/><force site="h"/><torque site="r1"/><framelinacc objtype="site" objname="h"/>
+                <accelerometer site="l"/><tendonvel tendon="f"/></sensor>"#
+            ),
+        )
+    },
+    Case {
+        qvel: &[3.0, 2.0, -3.0, 0.5, 0.2, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        ctrl: &[0.1],
+        ..case(
+            "armature with implicitfast and contacts",
+            arms!(
+                r#"<geom type="plane" size="2 2 1" pos="0 0 -0.3" conaffinity="1"/><body pos="0 0 -0.22"><freejoint/><geom size="0.1" contype="1"/></body></worldbody>
+                <option integrator="implicitfast"/><tendon><spatial name="s" armature="0.3" damping="2"><site site="post"/><site site="h"/></spatial>
+                <fixed armature="0.05"><joint joint="right" coef="0.5"/><joint joint="hand" coef="-2"/></fixed></tendon>
+                <actuator><position tendon="s" kp="20" kv="2"/></actuator>"#
+            ),
+        )
+    },
+    Case {
+        qvel: &[1.0, 2.0, -3.0, 0.5, 0.2, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        ..case(
+            "armature with a low cap, Newton",
+            arms!(
+                r#"<geom type="plane" size="2 2 1" pos="0 0 -0.3" conaffinity="1"/><body pos="0 0 -0.22"><freejoint/><geom size="0.1" contype="1"/></body></worldbody>
+                <option iterations="2" solver="Newton"/>
+                <tendon><spatial armature="0.2" range="0.3 0.6"><site site="l"/><site site="hub"/><site site="h"/></spatial>
+                <fixed armature="0.05" frictionloss="0.3"><joint joint="turn" coef="0.5"/><joint joint="hand" coef="-2"/></fixed></tendon>"#
+            ),
+        )
+    },
+    Case {
+        qvel: &[1.0, 2.0, -3.0, 0.5, 0.2, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        ..case(
+            "armature with a low cap, CG",
+            arms!(
+                r#"<geom type="plane" size="2 2 1" pos="0 0 -0.3" conaffinity="1"/><body pos="0 0 -0.22"><freejoint/><geom size="0.1" contype="1"/></body></worldbody>
+                <option iterations="40" solver="CG"/>
+                <tendon><spatial armature="0.2" range="0.3 0.6"><site site="l"/><site site="hub"/><site site="h"/></spatial>
+                <fixed armature="0.05" frictionloss="0.3"><joint joint="turn" coef="0.5"/><joint joint="hand" coef="-2"/></fixed></tendon>"#
+            ),
+        )
+    },
+    Case {
+        qvel: &[0.3, 0.2, 0.0, 1.0, -0.5, 2.0, 1.0, 0.5, 0.2, -1.0],
+        ..case(
+            "armature on a body in flight, with Runge-Kutta",
+            r#"<option integrator="RK4" gravity="0 0 -1"/><worldbody><site name="post" pos="-1 0 0.3"/><body><freejoint/>
+            <geom type="capsule" size="0.04" fromto="0 0 0 0 0 -1"/><site name="a" pos="0.1 0 -0.3"/>
+            <site name="b" pos="0.05 -0.08 -1.1"/><body pos="0 0 -1"><joint axis="0 -1 0" stiffness="20"/>
+            <geom type="capsule" size="0.03" fromto="0 0 0 -0.6 0 0"/><body pos="-0.6 0 0"><joint type="ball" stiffness="20" armature="0.2"/>
+            <site name="c" pos="0.03 0.1 0.15"/><geom type="box" size="0.03 0.1 0.15" pos="0 0 -0.05"/></body></body></body></worldbody>
+            <tendon><spatial armature="9"><site site="a"/><site site="b"/><site site="c"/></spatial>
+            <spatial armature="0.5"><site site="post"/><site site="c"/></spatial></tendon><sensor><e_kinetic/></sensor>"#,
+        )
+    },
+    Case {
+        qvel: &[0.5, -1.0, 2.0],
+        ..case(
+            "armature on a body of slides",
+            r#"<worldbody><site name="post"/><body pos="1 0 0"><joint type="slide" damping="0.1"/><joint type="slide" axis="1 0 0"/>
+            <joint axis="0 1 0"/><geom size="0.1" mass="1"/><site name="a" pos="0 0 0.05"/></body></worldbody>
+            <tendon><spatial armature="5" stiffness="100" springlength="0.5"><site site="post"/><site site="a"/></spatial></tendon>"#,
+        )
+    },
+    Case {
+        qvel: &[3.0, 2.0, -3.0, 0.5, 0.2, -1.0],
         ..case(
             "limits and dry friction",
             arms!(

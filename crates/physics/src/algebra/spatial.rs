@@ -198,6 +198,14 @@ pub fn cross_motion<T: Real>(v: &V6<T>, s: &V6<T>) -> V6<T> {
     [a[0], a[1], a[2], l[0], l[1], l[2]]
 }
 
+/// Rate of change of a force `f` that moves with `v`.
+#[inline(always)]
+pub fn cross_force<T: Real>(v: &V6<T>, f: &V6<T>) -> V6<T> {
+    let t = cross_add(&lin(v), &lin(f), &cross(&ang(v), &ang(f)));
+    let l = cross(&ang(v), &lin(f));
+    [t[0], t[1], t[2], l[0], l[1], l[2]]
+}
+
 /// Spatial momentum of a rigid body moving with `v`.
 #[inline(always)]
 pub fn inertia_mul<T: Real>(i: &Inertia<T>, v: &V6<T>) -> V6<T> {

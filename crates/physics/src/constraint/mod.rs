@@ -6,4 +6,4 @@ mod tendon;
 
 pub(crate) use equality::equality_blocks;
 pub(crate) use joint::joint_rows;
-pub(crate) use tendon::tendon_blocks;
+pub(crate) use tendon::{tendon_blocks, tendon_inertia};

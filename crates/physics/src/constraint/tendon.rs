@@ -1,4 +1,4 @@
-//! Rows over several degrees of freedom: friction and limits of tendons, and limits of ball joints.
+//! Rows over several degrees of freedom: inertia, friction and limits of tendons, and limits of ball joints.
 
 use crate::algebra::spatial::quat_to_rotvec;
 use crate::lanes::{Real, kernel_fn};
@@ -6,6 +6,23 @@ use crate::rows::{ConstraintRows, Source};
 use crate::sim::{Cost, Sim, Softness, impedance};
 use crate::state::{Group, Work};
 
+kernel_fn! {
+    /// Writes the blocks of tendons' inertia. They come before all others.
+    pub(crate) fn tendon_inertia<'a, T>(sim: &'a Sim<T>, work: &'a mut Work<T>) {
+        let Work { rows, forces, strings, .. } = work;
+        for (i, t) in sim.tendons.iter().enumerate() {
+            for chain in &t.chains {
+                let index = rows.blocks.add();
+                let block = &mut rows.blocks[index];
+                block.reset(Source::TendonInertia, Cost::Equal, 1);
+                block.on = T::not(T::none());
+                block.d[0] = T::splat(t.armature);
+                block.u0[0] = strings.drift[i];
+                block.tie_joints(chain.iter().map(|place| t.arm(*place, &forces.tendon_moments)));
+            }
+        }
+    }
+}
 kernel_fn! {
     /// Writes the blocks of tendons' dry friction and limits, and of ball joints' limits.
     pub(crate) fn tendon_blocks<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {

@@ -171,7 +171,7 @@ pub(crate) fn actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
                 for (dof, arm) in sim.tendons[*index].arms(&forces.tendon_moments) {
                     qfrc[dof] = pull.mul_add(arm, qfrc[dof]);
                 }
-                if sim.damped_tendons.is_some() {
+                if sim.implicit_fast && sim.tree_matrix.is_some() {
                     let sum = &mut forces.minus_tendon_deriv[*index];
                     *sum = (gear * gear).neg_mul_add(slope, *sum);
                 }
@@ -185,6 +185,9 @@ pub(crate) fn actuation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
             // the contacts are not known yet
             TransmissionSpec::Adhesion => {}
         }
+    }
+    for (force, carried) in forces.qfrc_passive_actuator.iter_mut().zip(&forces.gravcomp[1]) {
+        *force += *carried;
     }
     if limited {
         for (dof, low, high) in &sim.joint_force_ranges {

@@ -1,5 +1,7 @@
-//! Forces on links that do not come from joints: gravity compensation, fluid forces, and external pushes.
+//! Forces on links that do not come from joints: gravity compensation, the [medium](super::fluid), and external pushes.
 
+use super::fluid::fluid;
+use super::joint_space::joint_space;
 use crate::algebra::spatial::*;
 use crate::lanes::{Real, kernel_fn};
 use crate::sim::Sim;
@@ -9,9 +11,34 @@ kernel_fn! {
     /// External torques and forces on links.
     pub(crate) fn link_forces<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
         work.forces.link_applied.resize(sim.links.len(), [T::zero(); 6]);
-        gravity_compensation(sim, group, work);
+        if sim.actuated_gravcomp.is_empty() {
+            gravity_compensation(sim, group, work);
+        }
         fluid(sim, work);
         xfrc_applied(sim, group, work);
+    }
+}
+
+kernel_fn! {
+    /// Gravity compensation as forces of joints, for models in which some of it counts as an actuator force.
+    pub(crate) fn joint_gravity_compensation<'a, T>(sim: &'a Sim<T>, group: &'a Group<T>, work: &'a mut Work<T>) {
+        work.forces.link_applied.clear();
+        work.forces.link_applied.resize(sim.links.len(), [T::zero(); 6]);
+        gravity_compensation(sim, group, work);
+        let Work { forces, dofs, .. } = work;
+        let [passive, actuated] = &mut forces.gravcomp;
+        actuated.fill(T::zero());
+        joint_space(sim, dofs, &mut forces.link_applied, actuated);
+        passive.fill(T::zero());
+        for ((passive, actuated), by_actuator) in passive.iter_mut().zip(actuated).zip(&sim.actuated_gravcomp) {
+            if !by_actuator {
+                std::mem::swap(passive, actuated);
+            }
+        }
+        // as in MuJoCo, no force acts as an actuator's in a model without actuators
+        if sim.actuators.is_empty() {
+            forces.gravcomp[1].fill(T::zero());
+        }
     }
 }
 
@@ -27,31 +54,7 @@ fn gravity_compensation<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work
             mass *= varied.mass[link];
         }
         let force = [-(gravity[0] * mass), -(gravity[1] * mass), -(gravity[2] * mass)];
-        apply(work, link, &r, &force, &[T::zero(); 3]);
-    }
-}
-
-/// Viscosity and drag of the medium.
-#[inline(always)]
-fn fluid<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
-    let z = T::zero();
-    for drag in &sim.drags {
-        let m = &sim.coms[drag.body];
-        let axes = work.motion.axes(m);
-        let r = work.motion.arm(m, drag.link);
-        let v = &work.motion.vel[drag.link];
-        let through = sub3(&cross_add(&ang(v), &r, &lin(v)), &splat3(&sim.wind));
-        let (mut force, mut torque) = ([z; 3], [z; 3]);
-        for k in 0..3 {
-            let (w, u) = (dot(&axes[k], &ang(v)), dot(&axes[k], &through));
-            let t = -(w * T::splat(drag.angular[k]).mul_add(w.abs(), T::splat(drag.viscous[0])));
-            let f = -(u * T::splat(drag.linear[k]).mul_add(u.abs(), T::splat(drag.viscous[1])));
-            for i in 0..3 {
-                torque[i] = axes[k][i].mul_add(t, torque[i]);
-                force[i] = axes[k][i].mul_add(f, force[i]);
-            }
-        }
-        apply(work, drag.link, &r, &force, &torque);
+        work.forces.push(link, &r, &force, &[T::zero(); 3]);
     }
 }
 
@@ -62,16 +65,6 @@ fn xfrc_applied<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>) {
         let m = &sim.coms[body];
         let Some(link) = m.link else { continue };
         let r = work.motion.arm(m, link);
-        apply(work, link, &r, &lin(push), &ang(push));
-    }
-}
-
-/// Adds a force at a point of a link, and a torque.
-#[inline(always)]
-fn apply<T: Real>(work: &mut Work<T>, link: usize, r: &V3<T>, force: &V3<T>, torque: &V3<T>) {
-    let t = cross_add(r, force, torque);
-    for i in 0..3 {
-        work.forces.link_applied[link][i] += t[i];
-        work.forces.link_applied[link][3 + i] += force[i];
+        work.forces.push(link, &r, &lin(push), &ang(push));
     }
 }

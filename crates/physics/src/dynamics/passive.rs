@@ -14,6 +14,9 @@ pub(crate) fn joint_passive<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
         let damping = T::splat(*damping);
         (*force, *minus_qderiv) = (-(damping * *vel), damping);
     }
+    for (force, carried) in work.forces.qfrc_passive.iter_mut().zip(&work.forces.gravcomp[0]) {
+        *force += *carried;
+    }
     for joint in &sim.joints {
         if !joint.has_spring {
             continue;
@@ -90,7 +93,7 @@ pub(crate) fn tendon_passive<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
             forces.qfrc_passive[dof] = arm.mul_add(force, forces.qfrc_passive[dof]);
         }
     }
-    if let Some(matrix) = &sim.damped_tendons {
+    if let Some(matrix) = &sim.tree_matrix {
         for t in &matrix.tendons {
             forces.minus_tendon_deriv[*t] = T::splat(sim.tendons[*t].damping);
         }

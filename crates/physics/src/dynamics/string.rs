@@ -23,8 +23,44 @@ kernel_fn! {
                 velocity = arm.mul_add(group.qvel[*dof], velocity);
             }
             (strings.length[string.tendon], strings.velocity[string.tendon]) = (length, velocity);
+            if tendon.is_heavy() {
+                let gravity = group.gravity(sim);
+                let mut drift = T::zero();
+                for span in string.spans.iter().filter(|span| !span.levers.is_empty()) {
+                    drift = span_drift(motion, span, &gravity).mul_add(T::splat(span.share), drift);
+                }
+                strings.drift[string.tendon] = drift;
+            }
         }
     }
+}
+
+/// Velocity of a point of a body, and its acceleration without those of the joints.
+#[inline(always)]
+fn bias_motion<T: Real>(motion: &Motion<T>, spot: &Spot<T::Scalar>, r: &V3<T>, gravity: &V3<T>) -> [V3<T>; 2] {
+    let Some(l) = spot.mount.link else { return [[T::zero(); 3]; 2] };
+    let (vel, acc) = (&motion.vel[l], &motion.bias_acc[l]);
+    let v = cross_add(&ang(vel), r, &lin(vel));
+    let a = cross_add(&ang(vel), &v, &cross_add(&ang(acc), r, &lin(acc)));
+    // the bias acceleration includes gravity
+    [v, add3(&a, gravity)]
+}
+
+/// Acceleration of the length of a span from site to site without accelerations of the joints.
+#[inline(always)]
+fn span_drift<T: Real>(motion: &Motion<T>, span: &Span<T::Scalar>, gravity: &V3<T>) -> T {
+    let [first, second] = &span.ends;
+    let arms = [arm(motion, first), arm(motion, second)];
+    let apart = between(motion, [first, second], &arms);
+    let along = unit3(&apart);
+    let [v0, a0] = bias_motion(motion, first, &arms[0], gravity);
+    let [v1, a1] = bias_motion(motion, second, &arms[1], gravity);
+    let (v, a) = (sub3(&v1, &v0), sub3(&a1, &a0));
+    // what is across the string turns it
+    let rate = dot(&v, &along);
+    let across = rate.neg_mul_add(rate, dot(&v, &v));
+    let (length, least) = (dot(&apart, &apart).sqrt(), T::lit(1e-15));
+    dot(&a, &along) + T::masked(least.lt(length), across.div(length.max(least)))
 }
 
 /// A point of a link, relative to its tree's reference point; in the world for a static point.

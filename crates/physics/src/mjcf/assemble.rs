@@ -13,8 +13,8 @@ use super::settings::{Settings, entries};
 use super::tree::{BodySpec, CameraSpec, LightSpec, SiteSpec};
 use super::value::Attrs;
 use super::{
-    actuator, asset, contact, custom, equality, geom, inertia, mass_matrix, mesh, pose, schema, sensor, settings,
-    statistics, tendon, tree,
+    actuator, asset, contact, custom, equality, fluid, geom, inertia, mass_matrix, mesh, pose, schema, sensor,
+    settings, statistics, tendon, tree,
 };
 use crate::hint::{did_you_mean, nearest};
 use crate::model::*;
@@ -25,7 +25,6 @@ pub(crate) fn compile(root: &Element, file: &ReadFile, room: &Room) -> Result<Mo
     schema::check(root)?;
     let opt = settings::options(root)?;
     let mut settings = Settings::read(root)?;
-    settings.medium = opt.density != 0.0 || opt.viscosity != 0.0;
     settings.sleep = settings::sleep(root);
     let given = settings::statistics(root)?;
     let defaults = Defaults::read(root, room)?;
@@ -358,6 +357,7 @@ fn convert_geom(spec: &GeomSpec, body: usize, materials: &BTreeMap<&str, Option<
         rgba: color(&spec.shape, spec.element, spec.material, materials)?,
         material: spec.material.map(str::to_owned),
         group: spec.shape.group,
+        fluid: spec.fluid.and_then(|given| fluid::ellipsoid(spec.shape.kind, spec.shape.size, given)),
     })
 }
 

@@ -3,6 +3,7 @@
 use super::asset::Assets;
 use super::document::Element;
 use super::error::MjcfError;
+use super::fluid;
 use super::math::*;
 use super::mesh::{Content, MeshAsset};
 use super::orientation::orientation;
@@ -64,6 +65,8 @@ pub(crate) struct GeomSpec<'a> {
     missing: Option<MjcfError>,
     pub mass: Option<f64>,
     pub density: f64,
+    /// Coefficients of the medium's forces, if it takes the geom for an ellipsoid.
+    pub fluid: Option<[f64; 5]>,
 }
 
 /// Contact parameters of a geom.
@@ -107,6 +110,7 @@ pub(crate) fn check_default(attrs: &Attrs, settings: &Settings) -> Result<(), Mj
     ShapeValues::read(attrs, settings, [0.0; 3])?;
     if attrs.element.name == "geom" {
         Surface::read(attrs)?;
+        fluid::read(attrs)?;
         attrs.array::<1>("mass")?;
         attrs.array::<1>("density")?;
     }
@@ -121,11 +125,6 @@ impl GeomSpec<'_> {
         settings: &Settings,
         assets: &Assets<'a>,
     ) -> Result<GeomSpec<'a>, MjcfError> {
-        let ellipsoid = attrs.keyword("fluidshape", &[("none", false), ("ellipsoid", true)])?.unwrap_or(false);
-        if let Some((element, _)) = attrs.find("fluidshape").filter(|_| ellipsoid && settings.medium) {
-            let reason = "the ellipsoid model of the medium's forces is not supported; only fluidshape=\"none\" is";
-            return Err(element.unsupported(Some("fluidshape"), reason));
-        }
         let shape = ShapeSpec::read(attrs, outer, settings, [0.0; 3], Some(assets))?;
         let surface = Surface::read(attrs)?;
         let asset = attrs.text("mesh").and_then(|name| assets.mesh_names.get(name)).map(|i| &assets.meshes[i]);
@@ -146,6 +145,7 @@ impl GeomSpec<'_> {
             missing,
             mass: attrs.array::<1>("mass")?.map(|m| m[0]),
             density: attrs.number_or("density", 1000.0)?,
+            fluid: fluid::read(attrs)?,
         })
     }
 

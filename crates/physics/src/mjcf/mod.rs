@@ -26,6 +26,7 @@ mod equality;
 mod error;
 mod factor;
 mod file;
+mod fluid;
 mod geom;
 mod inertia;
 mod joint;

@@ -219,8 +219,8 @@ const BODY: &[Rule] = &[
             "geom",
             "name class type pos quat axisangle euler xyaxes zaxis fromto size mass density contype conaffinity \
              condim priority friction solmix solref solimp margin gap group rgba material \
-             hfield mesh fitscale fluidshape",
-            "castshadow fluidcoef user",
+             hfield mesh fitscale fluidshape fluidcoef",
+            "castshadow user",
             "adhesion=0 surfacevel=0 shellinertia=false",
         ),
         &[NO_PLUGIN],

@@ -30,8 +30,6 @@ pub(crate) struct Settings {
     pub inertiagrouprange: [i32; 2],
     /// Folder of height fields and meshes, relative to the model.
     pub meshdir: String,
-    /// The medium has density or viscosity.
-    pub medium: bool,
     /// Bodies at rest may fall asleep in MuJoCo.
     pub sleep: bool,
     /// Files are looked up by their last path component.
@@ -89,7 +87,6 @@ impl Settings {
             inertiafromgeom: Tristate::Auto,
             inertiagrouprange: [0, 5],
             meshdir: String::new(),
-            medium: false,
             sleep: false,
             strippath: false,
             fitaabb: false,

@@ -19,7 +19,7 @@ pub use actuator::{Actuator, Dynamics, Muscle, Transmission};
 pub use coupling::{Equality, EqualityKind, PathPart, PathSpan, Tendon, TendonKind};
 pub use hull::Hull;
 pub use sensor::{Sensor, SensorObject, SensorType};
-pub use shape::{Geom, GeomType, HField, Mesh, Pair, Site};
+pub use shape::{EllipsoidFluid, Geom, GeomType, HField, Mesh, Pair, Site};
 pub use view::{Camera, Light, TrackMode};
 
 /// A point or direction in meters (or unit free), `[x, y, z]`.
@@ -209,10 +209,9 @@ pub enum Integrator {
     Euler,
     /// Fourth-order Runge-Kutta.
     Rk4,
-    /// `implicit`; parsed and refused by the simulator for now.
+    /// Forces that depend on velocities are taken at the end of the step.
     Implicit,
-    /// `implicitfast`. The simulator refuses it in a medium with density or viscosity, with damped tendons, and with
-    /// velocity feedback of actuators on tendons.
+    /// The same without Coriolis and centripetal forces, except for free bodies that stand alone.
     ImplicitFast,
 }
 

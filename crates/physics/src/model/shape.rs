@@ -73,6 +73,23 @@ pub struct Geom {
     pub material: Option<String>,
     /// User group, for viewers.
     pub group: i32,
+    /// Forces of the medium on this geom, with `fluidshape="ellipsoid"`.
+    pub fluid: Option<EllipsoidFluid>,
+}
+
+/// Coefficients of the medium's forces on a geom, which is like an ellipsoid to it (MuJoCo `geom_fluid`).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EllipsoidFluid {
+    /// Half lengths of the ellipsoid's axes, m.
+    pub semiaxes: Vec3,
+    /// Drag across the ellipsoid, along it, and against rotations.
+    pub drag: [f64; 3],
+    /// Lift by the shape (Kutta) and by rotations (Magnus).
+    pub lift: [f64; 2],
+    /// Mass of the medium that moves along, divided by its density, m^3.
+    pub virtual_mass: Vec3,
+    /// The same of its inertia, m^5.
+    pub virtual_inertia: Vec3,
 }
 
 /// A point of interest fixed to a body.

@@ -275,6 +275,9 @@ impl<T: Real> Kernel<T> for Actuation<'_, T> {
                 }
             }
         }
+        for (sum, carried) in work.readings.qfrc_actuator.iter_mut().zip(&work.forces.gravcomp[1]) {
+            *sum += *carried;
+        }
         for (i, spec) in sim.adhesions.iter().enumerate() {
             let force = work.forces.actuator_force[spec.actuator];
             for (sum, arm) in work.readings.qfrc_actuator.iter_mut().zip(work.adhesion.of(sim, i)) {

@@ -3,7 +3,7 @@
 use super::Readings;
 use crate::algebra::spatial::*;
 use crate::lanes::Real;
-use crate::model::{JointType, TendonKind};
+use crate::model::JointType;
 
 /// Mass properties and motion of a body with all bodies below it.
 pub(super) struct Subtree<T> {
@@ -113,10 +113,9 @@ impl<T: Real> Readings<'_, T> {
         dot(&v, &v).sqrt()
     }
 
-    /// Kinetic energy, including that of armatures.
+    /// Kinetic energy, including that of the armature of joints and tendons.
     #[inline(always)]
     pub(super) fn kinetic_energy(&self) -> T {
-        let m = &self.sim.model;
         let mut twice = T::zero();
         for (inertia, v) in self.work.motion.inertia.iter().zip(&self.work.motion.vel) {
             twice += dot6(v, &inertia_mul(inertia, v));
@@ -124,36 +123,17 @@ impl<T: Real> Readings<'_, T> {
         for (armature, v) in self.sim.armature.iter().zip(&self.group.qvel) {
             twice = (T::splat(*armature) * *v).mul_add(*v, twice);
         }
-        for tendon in m.tendons.iter().filter(|t| t.armature != 0.0) {
-            let TendonKind::Fixed(terms) = &tendon.kind else { continue };
-            for (i, (a, ca)) in terms.iter().enumerate() {
-                for (b, cb) in &terms[..=i] {
-                    let (a, b) = (m.joints[*a].dof_adr, m.joints[*b].dof_adr);
-                    // the mass matrix couples a degree of freedom only with its ancestors
-                    let weight = match a == b {
-                        true => 1.0,
-                        false if self.above(a, b) || self.above(b, a) => 2.0,
-                        false => continue,
-                    };
-                    let c = T::lit(weight * tendon.armature * ca * cb);
-                    twice = (c * self.group.qvel[a]).mul_add(self.group.qvel[b], twice);
+        for tendon in self.sim.tendons.iter().filter(|t| t.is_heavy()) {
+            for chain in &tendon.chains {
+                let mut rate = T::zero();
+                for place in chain {
+                    let (dof, arm) = tendon.arm(*place, &self.work.strings.moments);
+                    rate = arm.mul_add(self.group.qvel[dof], rate);
                 }
+                twice = (T::splat(tendon.armature) * rate).mul_add(rate, twice);
             }
         }
         T::lit(0.5) * twice
-    }
-
-    /// Whether degree of freedom `a` carries `b`.
-    #[inline(always)]
-    fn above(&self, a: usize, b: usize) -> bool {
-        let mut d = self.sim.model.dofs[b].parent;
-        while let Some(i) = d {
-            if i == a {
-                return true;
-            }
-            d = self.sim.model.dofs[i].parent;
-        }
-        false
     }
 }
 

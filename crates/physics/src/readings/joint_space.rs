@@ -6,12 +6,20 @@ use super::Readings;
 use crate::algebra::spatial::*;
 use crate::dynamics::joint_space;
 use crate::lanes::Real;
+use crate::rows::Source;
 use crate::state::Work;
 
 impl<T: Real> Readings<'_, T> {
     /// Coriolis, centrifugal and gravitational forces, N or N m.
     pub fn qfrc_bias(&self) -> Vec<T> {
-        self.joint_space(self.work.motion.bias_force.clone())
+        let mut bias = self.joint_space(self.work.motion.bias_force.clone());
+        for (i, tendon) in self.sim.tendons.iter().enumerate().filter(|(_, t)| t.is_heavy()) {
+            let force = T::splat(tendon.armature) * self.work.strings.drift[i];
+            for (dof, arm) in tendon.arms(&self.work.strings.moments) {
+                bias[dof] = arm.mul_add(force, bias[dof]);
+            }
+        }
+        bias
     }
 
     /// Total of springs, dampers, actuators, the medium and pushes (`qfrc_passive + qfrc_actuator` and `xfrc_applied`).
@@ -54,6 +62,17 @@ impl<T: Real> Readings<'_, T> {
             row[i] += T::splat(self.sim.armature[i]);
             rows.push(row);
         }
+        for tendon in self.sim.tendons.iter().filter(|t| t.is_heavy()) {
+            for chain in &tendon.chains {
+                let arms: Vec<(usize, T)> =
+                    chain.iter().map(|place| tendon.arm(*place, &self.work.strings.moments)).collect();
+                for (i, a) in &arms {
+                    for (j, b) in &arms {
+                        rows[*i][*j] = (T::splat(tendon.armature) * *a).mul_add(*b, rows[*i][*j]);
+                    }
+                }
+            }
+        }
         rows
     }
 
@@ -88,7 +107,7 @@ pub(crate) fn constraint_wrenches<T: Real>(work: &Work<T>, links: &mut [V6<T>], 
             links[c.link][i] += w[i];
         }
     }
-    for b in work.rows.blocks.iter() {
+    for b in work.rows.blocks.iter().filter(|b| b.source != Source::TendonInertia) {
         b.exert_on_links(links);
         for (dof, coefficient) in b.joint_terms() {
             joints[*dof] = coefficient.mul_add(b.force[0], joints[*dof]);

@@ -86,16 +86,13 @@ impl<T: Real> Readings<'_, T> {
         }
     }
 
-    /// Total force of all actuators on a hinge or slide, including those that act through tendons and sites. `None` if gravity
-    /// compensation counts as one of them.
+    /// Total force of all actuators on a hinge or slide, including those that act through tendons and sites, and gravity
+    /// compensation if it counts as one.
     #[inline(always)]
-    pub(super) fn joint_actuator_force(&self, joint: usize) -> Option<T> {
+    pub(super) fn joint_actuator_force(&self, joint: usize) -> T {
         let m = &self.sim.model;
         let one = &m.joints[joint];
-        if one.actuator_gravcomp && m.bodies.iter().any(|b| b.gravcomp != 0.0) {
-            return None;
-        }
-        let mut sum = T::zero();
+        let mut sum = self.work.forces.gravcomp[1].get(one.dof_adr).copied().unwrap_or(T::zero());
         for (i, a) in m.actuators.iter().enumerate() {
             if let Transmission::Tendon(t) = a.transmission
                 && self.sim.tendons[t].spatial
@@ -133,7 +130,7 @@ impl<T: Real> Readings<'_, T> {
         if let Some([low, high]) = one.actuator_force_range {
             sum = sum.max(T::lit(low)).min(T::lit(high));
         }
-        Some(sum)
+        sum
     }
 
     /// Total force of the actuators that pull a tendon.

@@ -38,7 +38,7 @@ impl<T: Real> Readings<'_, T> {
             (S::RangeFinder, O::Site(site)) => self.range_finder(site, s.intprm[0])?,
             (S::JointPos, O::Joint(j)) => vec![self.group.qpos[self.sim.joints[j].qpos]],
             (S::JointVel, O::Joint(j)) => vec![self.group.qvel[self.sim.joints[j].dof]],
-            (S::JointActuatorFrc, O::Joint(j)) => vec![self.joint_actuator_force(j)?],
+            (S::JointActuatorFrc, O::Joint(j)) => vec![self.joint_actuator_force(j)],
             (S::JointLimitPos | S::JointLimitVel | S::JointLimitFrc, O::Joint(j)) => {
                 limit_value(s.kind, &self.joint_limit(j))
             }

@@ -46,7 +46,7 @@ impl<T: Real> Readings<'_, T> {
         out
     }
 
-    /// The total force that lengthens a tendon: springs, dampers, actuators and constraints.
+    /// The total force that lengthens a tendon: inertia, springs, dampers, actuators and constraints.
     #[inline(always)]
     fn tension(&self, tendon: usize) -> T {
         let (t, forces) = (&self.sim.tendons[tendon], &self.work.forces);
@@ -54,6 +54,13 @@ impl<T: Real> Readings<'_, T> {
         let below = (T::splat(t.slack[0]) - length).max(T::zero());
         let above = (T::splat(t.slack[1]) - length).min(T::zero());
         let mut sum = (below + above) * T::splat(t.stiffness) - T::splat(t.damping) * forces.tendon_velocity[tendon];
+        if t.is_heavy() {
+            let mut acc = self.work.strings.drift[tendon];
+            for (dof, arm) in t.arms(&forces.tendon_moments) {
+                acc = arm.mul_add(self.work.solver.qacc[dof], acc);
+            }
+            sum = T::splat(t.armature).neg_mul_add(acc, sum);
+        }
         for (actuator, force) in self.sim.actuators.iter().zip(&forces.actuator_force) {
             if let TransmissionSpec::Tendon { index, gear } = &actuator.transmission
                 && *index == tendon

@@ -25,6 +25,8 @@ pub(crate) enum Source {
     BallLimit(usize),
     /// Dry friction of a tendon.
     TendonFriction(usize),
+    /// Armature of a tendon. It is no constraint: the solver finds its inertial force like that of a soft row.
+    TendonInertia,
 }
 
 /// A constraint of up to six rows.

@@ -61,6 +61,11 @@ impl<T: Real> Blocks<T> {
         self.len = 0;
     }
 
+    /// Hides all blocks but the first `len`, or shows that many again. Returns the number that was shown.
+    pub fn show(&mut self, len: usize) -> usize {
+        std::mem::replace(&mut self.len, len.min(self.items.len()))
+    }
+
     /// Adds a block and returns its index. Its contents are those of an earlier block.
     pub fn add(&mut self) -> usize {
         if self.len == self.items.len() {

@@ -1,7 +1,7 @@
 //! The cost of rows, and its increase along a segment. Differences are computed per zone, as in MuJoCo, so that they
 //! stay accurate if two costs are nearly equal.
 
-use super::block::{Block, RowValues};
+use super::block::{Block, RowValues, Source};
 use super::cone::ConePoint;
 use super::floor::FloorRow;
 use super::joint::{DryRow, LimitRow};
@@ -160,6 +160,10 @@ impl<T: Real> Block<T> {
 impl<T: Real> RowCost<T> for Block<T> {
     #[inline(always)]
     fn cost(&self) -> T {
+        // its cost is one of the masses
+        if self.source == Source::TendonInertia {
+            return T::zero();
+        }
         let twice = match self.cost {
             Cost::Push => self.d[0] * push_cost(self.u[0]),
             Cost::Equal => self.flat_cost(&self.u),
@@ -178,6 +182,9 @@ impl<T: Real> RowCost<T> for Block<T> {
 
     #[inline(always)]
     fn along(&self, alpha: T) -> [T; 3] {
+        if self.source == Source::TendonInertia {
+            return [T::zero(); 3];
+        }
         let (mut by, half) = ([T::zero(); 6], T::lit(0.5));
         for k in 0..self.dim {
             by[k] = self.next[k] * alpha;

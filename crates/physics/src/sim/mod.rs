@@ -38,7 +38,7 @@ pub(crate) use drive::{DriveKind, DriveSpec};
 pub(crate) use equality::{EqualitySpec, Frames, Length, Tie};
 pub(crate) use limit::{BallLimit, DryFriction, LimitSpec};
 pub(crate) use link::{Link, LinkJoint, Mount};
-pub(crate) use medium::{Drag, GravComp};
+pub(crate) use medium::{Drag, EllipsoidDrag, GravComp};
 pub(crate) use muscle::{MuscleActivation, MuscleSpec};
 pub(crate) use no_slip::NoSlip;
 pub(crate) use options::MOST_COUPLED_ROWS;
@@ -81,16 +81,21 @@ pub struct Sim<T: Real> {
     pub(crate) tendon_force_ranges: Vec<TendonForceRange<T::Scalar>>,
     pub(crate) equalities: Vec<EqualitySpec<T::Scalar>>,
     pub(crate) tendons: Vec<TendonSpec<T::Scalar>>,
+    /// Number of blocks of tendons with armature.
+    pub(crate) inertia_blocks: usize,
     /// The paths of spatial tendons.
     pub(crate) strings: Vec<StringSpec<T::Scalar>>,
     pub(crate) adhesions: Vec<AdhesionSpec>,
     /// Transmissions through sites.
     pub(crate) drives: Vec<DriveSpec<T::Scalar>>,
-    /// The matrix of `implicitfast`, if tendons or drives have a share in it.
-    pub(crate) damped_tendons: Option<TreeMatrix>,
+    /// The matrix that the integrator solves with, if it does not fit the recursion over the tree.
+    pub(crate) tree_matrix: Option<TreeMatrix>,
     pub(crate) ball_limits: Vec<BallLimit<T::Scalar>>,
     pub(crate) gravcomp: Vec<GravComp<T::Scalar>>,
+    /// By degree of freedom: whether gravity compensation counts as an actuator force on it. Empty if none does.
+    pub(crate) actuated_gravcomp: Vec<bool>,
     pub(crate) drags: Vec<Drag<T::Scalar>>,
+    pub(crate) ellipsoid_drags: Vec<EllipsoidDrag<T::Scalar>>,
     pub(crate) wind: [T::Scalar; 3],
     pub(crate) contacts: Contacts<T::Scalar>,
     pub(crate) fields: Vec<HeightField<T::Scalar>>,
@@ -149,8 +154,13 @@ impl<T: Real> Sim<T> {
         let (strings, drives) = (string::strings::<T>(model, &places), drive::drives::<T>(model, &places));
         let contacts = contacts::contacts::<T>(model, &mounts, &link_of, &tree_of, &options)?;
         let damped = flags.damper && model.dofs.iter().any(|d| d.damping != 0.0);
-        let implicit_fast = model.opt.integrator == Integrator::ImplicitFast;
+        let implicit_fast = matches!(model.opt.integrator, Integrator::Implicit | Integrator::ImplicitFast);
+        let gravcomp = medium::gravity_compensation::<T>(model, &mounts, &link_of);
+        let drags = medium::drags::<T>(model, &mounts, &link_of);
+        let ellipsoid_drags = medium::ellipsoid_drags::<T>(model, &mounts, &link_of, |l| links[l].alone);
+        let medium = !(drags.is_empty() && ellipsoid_drags.is_empty());
         let rk4 = model.opt.integrator == Integrator::Rk4;
+        let implicit_damping = implicit_fast || (damped && flags.eulerdamp && !rk4);
         let gravity = if flags.gravity { model.opt.gravity } else { [0.0; 3] };
         // MuJoCo scales cost changes by 1 / (meaninertia * nv); a Newton decrement is twice the predicted change
         let tolerance = 2.0 * model.opt.tolerance * model.stat.mean_inertia * model.nv.max(1) as f64;
@@ -159,7 +169,7 @@ impl<T: Real> Sim<T> {
             joints: link::joints::<T>(model),
             armature: model.dofs.iter().map(|d| c(d.armature)).collect(),
             damping: model.dofs.iter().map(|d| c(if flags.damper { d.damping } else { 0.0 })).collect(),
-            implicit_damping: implicit_fast || (damped && flags.eulerdamp && !rk4),
+            implicit_damping,
             implicit_fast,
             hard: contacts.hard || equalities.iter().any(|e| e.hard),
             limits: limit::limits::<T>(model, &dof_link),
@@ -169,13 +179,16 @@ impl<T: Real> Sim<T> {
             joint_force_ranges: actuator::joint_force_ranges::<T>(model),
             tendon_force_ranges: actuator::tendon_force_ranges::<T>(model),
             equalities,
+            inertia_blocks: tendons.iter().map(|t| t.chains.len()).sum(),
             tendons,
             strings,
             adhesions: adhesion::adhesions(model),
             drives,
-            damped_tendons: TreeMatrix::of_damped_tendons(model),
-            gravcomp: medium::gravity_compensation::<T>(model, &mounts, &link_of),
-            drags: medium::drags::<T>(model, &mounts, &link_of),
+            tree_matrix: TreeMatrix::new(model, implicit_damping, medium),
+            actuated_gravcomp: medium::actuated_gravity_compensation(model, &gravcomp),
+            gravcomp,
+            drags,
+            ellipsoid_drags,
             wind: model.opt.wind.map(c),
             contacts,
             fields: model.hfields.iter().map(HeightField::new).collect(),

@@ -34,6 +34,9 @@ pub(crate) struct TendonSpec<C> {
     /// Lower and upper limit, as sums of two numbers each.
     pub limit: Option<([C; 2], [C; 2], Softness<C>)>,
     pub friction: Option<(C, Softness<C>)>,
+    /// Inertia of its velocity, and the parts of its arms that it couples: each part is on one path to the root.
+    pub armature: C,
+    pub chains: Vec<Vec<usize>>,
 }
 
 impl<C> TendonSpec<C> {
@@ -46,6 +49,58 @@ impl<C> TendonSpec<C> {
         let fixed = self.terms.iter().map(|t| (t.dof, T::splat(t.coef)));
         fixed.chain(self.dofs.iter().copied().zip(moments[self.moments.clone()].iter().copied()))
     }
+
+    /// One of these.
+    #[inline(always)]
+    pub fn arm<T: Real<Scalar = C>>(&self, place: usize, moments: &[T]) -> (usize, T)
+    where
+        C: Copy,
+    {
+        match self.terms.get(place) {
+            Some(t) => (t.dof, T::splat(t.coef)),
+            None => (self.dofs[place], moments[self.moments.start + place]),
+        }
+    }
+
+    /// Whether it has inertia.
+    #[inline(always)]
+    pub fn is_heavy(&self) -> bool {
+        !self.chains.is_empty()
+    }
+}
+
+/// The degrees of freedom that a tendon pulls, in the order of its arms.
+pub(super) fn dofs(model: &Model, kind: &TendonKind) -> Vec<usize> {
+    match kind {
+        TendonKind::Fixed(terms) => terms.iter().map(|(joint, _)| model.joints[*joint].dof_adr).collect(),
+        spatial => string::dofs(model, spatial),
+    }
+}
+
+/// The degrees of freedom that a tendon with armature pulls, split where the mass matrix has no entries. `None` if a
+/// part of them branches.
+pub(super) fn chains(model: &Model, tendon: &Tendon) -> Option<Vec<Vec<usize>>> {
+    if tendon.armature == 0.0 {
+        return Some(Vec::new());
+    }
+    let dofs = dofs(model, &tendon.kind);
+    // ancestors come first
+    let mut order: Vec<usize> = (0..dofs.len()).collect();
+    order.sort_by_key(|place| dofs[*place]);
+    let mut chains: Vec<Vec<usize>> = Vec::new();
+    for place in order {
+        let mut next = model.dofs[dofs[place]].parent;
+        while next.is_some_and(|d| !dofs.contains(&d)) {
+            next = next.and_then(|d| model.dofs[d].parent);
+        }
+        let Some(above) = next else {
+            chains.push(vec![place]);
+            continue;
+        };
+        let end = |chain: &&mut Vec<usize>| chain.last().is_some_and(|last| dofs[*last] == above);
+        chains.iter_mut().find(end)?.push(place);
+    }
+    Some(chains)
 }
 
 /// Prepares the tendons.
@@ -88,6 +143,9 @@ pub(super) fn tendons<T: Real>(model: &Model) -> Vec<TendonSpec<T::Scalar>> {
                 let soft = softness::<T>(model, &t.solref_friction, &t.solimp_friction, 0.0, weight);
                 (c(t.frictionloss), soft)
             }),
+            armature: c(t.armature),
+            // others are refused
+            chains: chains(model, t).unwrap_or_default(),
         }
     };
     model.tendons.iter().enumerate().map(&mut spec).collect()

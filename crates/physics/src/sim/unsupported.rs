@@ -1,32 +1,24 @@
 //! Refuses by name what the kernels do not support.
 
 use super::options::SimError;
-use crate::model::{Actuator, Body, Integrator, Joint, JointType, Model, Tendon, Transmission};
+use super::tendon::chains;
+use crate::model::{Actuator, Body, Joint, JointType, Model, Tendon, Transmission};
 
 /// Refuses a model that would not be simulated as in MuJoCo. Contacts are checked when their list is created.
 pub(crate) fn check(model: &Model) -> Result<(), SimError> {
     let refuse = |(what, remedy): (String, &str)| {
         Err(SimError::Unsupported { model: model.name.clone(), what, remedy: remedy.into() })
     };
-    let found = options(model)
-        .or_else(|| model.bodies.iter().find_map(|b| body(model, b)))
-        .or_else(|| model.tendons.iter().enumerate().find_map(tendon))
+    let found = model
+        .bodies
+        .iter()
+        .find_map(|b| body(model, b))
+        .or_else(|| model.tendons.iter().enumerate().find_map(|(i, t)| tendon(model, i, t)))
         .or_else(|| model.actuators.iter().enumerate().find_map(|(i, a)| actuator(model, i, a)));
     found.map_or(Ok(()), refuse)
 }
 
 type Refusal = Option<(String, &'static str)>;
-
-fn options(model: &Model) -> Refusal {
-    let in_medium = model.opt.density != 0.0 || model.opt.viscosity != 0.0;
-    match model.opt.integrator {
-        Integrator::Implicit => Some(("integrator Implicit".into(), "use Euler, RK4 or implicitfast")),
-        Integrator::ImplicitFast if in_medium => {
-            Some(("integrator ImplicitFast in a medium with density or viscosity".into(), "use Euler or RK4"))
-        }
-        _ => None,
-    }
-}
 
 fn body(model: &Model, body: &Body) -> Refusal {
     let joints = &model.joints[body.joint_start..body.joint_start + body.joint_count];
@@ -51,9 +43,6 @@ fn joint(model: &Model, body: &Body, siblings: &[Joint], i: usize, joint: &Joint
     if joint.stiffness_poly != [0.0; 2] || model.dofs[joint.dof_adr].damping_poly != [0.0; 2] {
         return Some((format!("polynomial stiffness or damping of joint '{name}'"), "use the linear term"));
     }
-    if joint.actuator_gravcomp && model.bodies.iter().any(|b| b.gravcomp != 0.0) {
-        return Some((format!("actuatorgravcomp of joint '{name}'"), "remove the attribute"));
-    }
     None
 }
 
@@ -62,15 +51,19 @@ fn label(name: &str, index: usize) -> String {
     if name.is_empty() { format!("number {index}") } else { format!("'{name}'") }
 }
 
-fn tendon((index, tendon): (usize, &Tendon)) -> Refusal {
+fn tendon(model: &Model, index: usize, tendon: &Tendon) -> Refusal {
     let name = label(&tendon.name, index);
     if tendon.stiffness_poly != [0.0; 2] || tendon.damping_poly != [0.0; 2] {
         return Some((format!("polynomial stiffness or damping of tendon {name}"), "use the linear term"));
     }
-    if tendon.armature != 0.0 {
-        return Some((format!("armature of tendon {name}"), "give the joints armature"));
+    if tendon.armature == 0.0 {
+        return None;
     }
-    None
+    let what = |where_: &str| Some((format!("armature of tendon {name} {where_}"), "give the joints armature"));
+    if chains(model, tendon).is_none() {
+        return what("on several branches and on what carries them");
+    }
+    if model.opt.noslip_iterations > 0 { what("with noslip_iterations") } else { None }
 }
 
 fn actuator(model: &Model, index: usize, a: &Actuator) -> Refusal {

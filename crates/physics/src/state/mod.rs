@@ -18,7 +18,7 @@ pub(crate) use coupling::Coupling;
 pub use group::Group;
 pub use obstacle::{Obstacle, ObstacleShape};
 pub use scratch::Work;
-pub(crate) use scratch::{Capped, DampedTendons, DofWork, Forces, GeomContacts, Motion, Solver, net_bias_force};
+pub(crate) use scratch::{Capped, DofWork, Forces, GeomContacts, Motion, Solver, net_bias_force};
 pub(crate) use scratch::{Law, MOST_ROWS, Patch, Place, Slip, SlipLane};
 pub use stats::SolverStats;
 pub(crate) use sweep::{Sweep, nowhere};

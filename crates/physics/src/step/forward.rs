@@ -2,7 +2,7 @@
 
 use crate::algebra::planar::{Full, Planar};
 use crate::collision::{adhere, collide_floor, collide_pairs};
-use crate::constraint::{equality_blocks, joint_rows, tendon_blocks};
+use crate::constraint::{equality_blocks, joint_rows, tendon_blocks, tendon_inertia};
 use crate::dynamics::*;
 use crate::lanes::{Real, kernel_fn};
 use crate::sim::Sim;
@@ -131,15 +131,26 @@ impl<T: Real> Sim<T> {
 
     fn smooth(&self, work: &mut Work<T>, group: &Group<T>) {
         self.refresh(work, group);
-        joint_forces(self, group, work);
+        self.joint_forces(work, group);
         work.forces.link_applied.clear();
-        if !self.gravcomp.is_empty() || !self.drags.is_empty() || !group.xfrc_applied.is_empty() {
+        let medium = !self.drags.is_empty() || !self.ellipsoid_drags.is_empty();
+        if !self.gravcomp.is_empty() || medium || !group.xfrc_applied.is_empty() {
             link_forces(self, group, work);
         }
     }
 
+    fn joint_forces(&self, work: &mut Work<T>, group: &Group<T>) {
+        if !self.actuated_gravcomp.is_empty() {
+            joint_gravity_compensation(self, group, work);
+        }
+        joint_forces(self, group, work);
+    }
+
     fn make_constraint(&self, work: &mut Work<T>, group: &Group<T>) {
         common_rows(self, group, work);
+        if self.inertia_blocks > 0 {
+            tendon_inertia(self, work);
+        }
         if !self.equalities.is_empty() {
             equality_blocks(self, group, work);
         }
@@ -180,7 +191,7 @@ impl<T: Real> Sim<T> {
     /// Like [`Sim::refresh`], including the forces of the actuators.
     pub(crate) fn refresh_actuators(&self, work: &mut Work<T>, group: &Group<T>) {
         self.refresh(work, group);
-        joint_forces(self, group, work);
+        self.joint_forces(work, group);
         if !self.adhesions.is_empty() {
             work.continues = false;
             self.make_constraint(work, group);

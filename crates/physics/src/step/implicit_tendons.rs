@@ -1,4 +1,5 @@
-//! `integrator="implicitfast"` for models with tendons, or actuators at sites, whose forces depend on their velocities.
+//! Integrators for models with tendons, or actuators at sites, that have a share in the integrator's matrix:
+//! `implicitfast` if their forces depend on their velocities, and every implicit integrator if tendons have armature.
 //!
 //! Such a tendon adds `J' b J` to the matrix that the integrator solves with, where `b` is its damping with that of its
 //! actuators. As in MuJoCo, only entries of degrees of freedom of which one carries the other count. A tendon across
@@ -11,7 +12,7 @@
 use crate::algebra::spatial::*;
 use crate::lanes::{Real, kernel_fn};
 use crate::sim::{Sim, TreeMatrix};
-use crate::state::{DampedTendons, Work};
+use crate::state::Work;
 
 kernel_fn! {
     /// Solves for the acceleration with all damping at the end of the step, into `solution`.
@@ -20,18 +21,19 @@ kernel_fn! {
         damping_matrix(sim, work, matrix);
         right_hand_side(sim, work, matrix);
         let dt = T::splat(sim.dt);
+        let separate = |l: usize| sim.implicit_fast && sim.links[l].alone;
         for l in 0..sim.links.len() {
-            if sim.links[l].alone {
+            if separate(l) {
                 free_body(sim, work, matrix, l);
             }
         }
-        let c = &mut work.damped_tendons;
+        let c = &mut work.implicit;
         for ((factor, mass), damping) in c.factor.iter_mut().zip(&c.mass).zip(&c.damping) {
             *factor = damping.mul_add(dt, *mass);
         }
         factorize(matrix, &mut c.factor);
         solve(matrix, &c.factor, &mut c.change);
-        for link in sim.links.iter().filter(|link| !link.alone) {
+        for (_, link) in sim.links.iter().enumerate().filter(|(l, _)| !separate(*l)) {
             for d in link.dofs.clone() {
                 work.solver.solution[d] = work.solver.qacc[d] + c.change[d];
             }
@@ -41,8 +43,8 @@ kernel_fn! {
 
 /// The mass matrix, from the inertias of each link with everything that it carries.
 #[inline(always)]
-fn mass_matrix<T: Real>(sim: &Sim<T>, work: &mut Work<T>, matrix: &TreeMatrix) {
-    let Work { motion, dofs, damped_tendons: c, .. } = work;
+pub(super) fn mass_matrix<T: Real>(sim: &Sim<T>, work: &mut Work<T>, matrix: &TreeMatrix) {
+    let Work { motion, dofs, forces, implicit: c, .. } = work;
     c.composite.copy_from_slice(&motion.inertia);
     for (l, link) in sim.links.iter().enumerate().rev() {
         for d in link.dofs.clone() {
@@ -61,45 +63,53 @@ fn mass_matrix<T: Real>(sim: &Sim<T>, work: &mut Work<T>, matrix: &TreeMatrix) {
             }
         }
     }
+    for t in &matrix.heavy {
+        let tendon = &sim.tendons[*t];
+        let arms = || tendon.arms(&forces.tendon_moments);
+        add_product(matrix, &mut c.arms, &mut c.mass, T::splat(tendon.armature), arms);
+    }
 }
 
 /// The negative derivative of the forces by the velocities: the diagonal, and the entries of tendons and drives.
 #[inline(always)]
 fn damping_matrix<T: Real>(sim: &Sim<T>, work: &mut Work<T>, matrix: &TreeMatrix) {
-    let Work { forces, damped_tendons: c, .. } = work;
+    let Work { forces, implicit: c, .. } = work;
     c.damping.fill(T::zero());
     for (start, x) in matrix.start.iter().zip(&forces.minus_qderiv) {
         c.damping[*start] = *x;
     }
     for t in &matrix.tendons {
         let tendon = &sim.tendons[*t];
-        add_product(matrix, c, forces.minus_tendon_deriv[*t], || tendon.arms(&forces.tendon_moments));
+        let arms = || tendon.arms(&forces.tendon_moments);
+        add_product(matrix, &mut c.arms, &mut c.damping, forces.minus_tendon_deriv[*t], arms);
     }
     for d in &matrix.drives {
-        add_product(matrix, c, forces.minus_drive_deriv[*d], || forces.drives.arms(sim, *d));
+        let arms = || forces.drives.arms(sim, *d);
+        add_product(matrix, &mut c.arms, &mut c.damping, forces.minus_drive_deriv[*d], arms);
     }
     for row in &matrix.dropped {
         c.damping[row.clone()].fill(T::zero());
     }
 }
 
-/// Adds `J' b J` to the damping, for the moment arms `J`.
+/// Adds `J' b J` to a matrix, for the moment arms `J`.
 #[inline(always)]
-fn add_product<T: Real, I: Iterator<Item = (usize, T)>>(
+pub(super) fn add_product<T: Real, I: Iterator<Item = (usize, T)>>(
     matrix: &TreeMatrix,
-    c: &mut DampedTendons<T>,
+    by_dof: &mut [T],
+    sums: &mut [T],
     rate: T,
     arms: impl Fn() -> I,
 ) {
-    c.arms.fill(T::zero());
+    by_dof.fill(T::zero());
     for (dof, arm) in arms() {
-        c.arms[dof] = arm;
+        by_dof[dof] = arm;
     }
     for (d, arm) in arms() {
         let force = rate * arm;
         let (mut at, mut next) = (matrix.start[d], Some(d));
         while let Some(i) = next {
-            c.damping[at] = force.mul_add(c.arms[i], c.damping[at]);
+            sums[at] = force.mul_add(by_dof[i], sums[at]);
             (at, next) = (at + 1, matrix.parent[i]);
         }
     }
@@ -109,7 +119,7 @@ fn add_product<T: Real, I: Iterator<Item = (usize, T)>>(
 #[inline(always)]
 fn right_hand_side<T: Real>(sim: &Sim<T>, work: &mut Work<T>, matrix: &TreeMatrix) {
     let dt = T::splat(sim.dt);
-    let Work { solver, damped_tendons: c, .. } = work;
+    let Work { solver, implicit: c, .. } = work;
     c.change.fill(T::zero());
     for d in 0..sim.model.nv {
         let (mut at, mut next) = (matrix.start[d] + 1, matrix.parent[d]);
@@ -181,7 +191,7 @@ fn solve<T: Real>(matrix: &TreeMatrix, a: &[T], x: &mut [T]) {
 #[inline(always)]
 fn free_body<T: Real>(sim: &Sim<T>, work: &mut Work<T>, matrix: &TreeMatrix, l: usize) {
     let (first, dt, z) = (sim.links[l].dofs.start, T::splat(sim.dt), T::zero());
-    let Work { motion, dofs, solver, damped_tendons: c, .. } = work;
+    let Work { motion, dofs, solver, implicit: c, .. } = work;
     // derivative of the bias force
     let mut bias = [[z; 6]; 6];
     let [_, x, y, zz, jxx, jyy, jzz, jxy, jxz, jyz] = motion.inertia[l];

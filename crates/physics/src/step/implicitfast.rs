@@ -2,6 +2,7 @@
 //! every velocity-dependent actuator force.
 
 use super::euler::integrate;
+use super::implicit::implicit;
 use super::implicit_tendons::implicit_tendons;
 use crate::algebra::planar::{Full, Planar, Space};
 use crate::algebra::spatial::*;
@@ -32,8 +33,12 @@ kernel_fn! {
 
 impl<T: Real> Sim<T> {
     pub(super) fn implicitfast(&self, work: &mut Work<T>, group: &mut Group<T>) {
-        if let Some(matrix) = &self.damped_tendons {
-            implicit_tendons(self, work, matrix);
+        if let Some(matrix) = &self.tree_matrix {
+            if matrix.full {
+                implicit(self, group, work, matrix);
+            } else {
+                implicit_tendons(self, work, matrix);
+            }
         } else if self.planar {
             planar_implicit_acceleration(self, work);
         } else {

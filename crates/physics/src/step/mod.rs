@@ -1,8 +1,10 @@
 //! One step, with MuJoCo's names for its stages: [`forward`] computes the acceleration, and an integrator ([`euler`],
-//! [`implicitfast`], [`rk4`]) advances the state. [`implicit_tendons`] is the part of `implicitfast` for tendons.
+//! [`implicitfast`], [`rk4`]) advances the state. [`implicit_tendons`] is the part of `implicitfast` for tendons, [`implicit`]
+//! that of the integrator `implicit` and of media.
 
 mod euler;
 mod forward;
+mod implicit;
 mod implicit_tendons;
 mod implicitfast;
 mod rk4;

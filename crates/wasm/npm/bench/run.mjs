@@ -2,6 +2,7 @@
 //
 //   npm install --no-save @mujoco/mujoco playwright-core
 //   node bench/run.mjs [--engine chromium|node] [--rounds 7] [--agents 64]
+//   node bench/run.mjs --learn 4e6 [--engine chromium|node]    decisions per processor second of a hopper that learns
 //
 // Times are those of the thread that computes, from /proc, so this runs on Linux only.
 import { fork } from "node:child_process";
@@ -16,6 +17,7 @@ const { values } = parseArgs({
     engine: { type: "string", default: "chromium" },
     rounds: { type: "string", default: "7" },
     agents: { type: "string", default: "64" },
+    learn: { type: "string" },
   },
 });
 const [rounds, many] = [Number(values.rounds), Number(values.agents)];
@@ -107,6 +109,19 @@ async function inChromium(side, port) {
 
 const server = await serve();
 const { port } = server.address();
+if (values.learn) {
+  for (const lanes of ["relaxed", "exact"]) {
+    const side = values.engine === "node" ? await inNode(lanes) : await inChromium(lanes, port);
+    const from = side.cpu();
+    const { steps, return_mean } = await side.call("learn", { task: "Hopper-v0", steps: Number(values.learn) });
+    const seconds = (side.cpu() - from) / 1e9;
+    const rate = Math.round(steps / seconds);
+    console.log(`${side.info}: ${steps} decisions in ${seconds.toFixed(1)} s, ${rate}/s, return ${return_mean.toFixed(1)}`);
+    await side.close();
+  }
+  server.close();
+  process.exit(0);
+}
 const sides = [];
 for (const name of ["mujoco", "exact", "relaxed"]) {
   const side = values.engine === "node" ? await inNode(name) : await inChromium(name, port);

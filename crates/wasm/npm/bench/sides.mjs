@@ -34,6 +34,14 @@ export async function marathon(load, options) {
     advance(decisions) {
       for (let i = 0; i < decisions; i++, at++) env.step(actions[at % STOCK]);
     },
+    /** Trains a task for a number of decisions. */
+    learn({ task, steps }) {
+      const trainer = module.trainer(task, { run: { total_steps: steps, seed: 1 } });
+      let last = null;
+      while (!trainer.done) last = trainer.iterate();
+      trainer.free();
+      return { steps: last.steps, return_mean: last.return_mean };
+    },
   };
 }
 

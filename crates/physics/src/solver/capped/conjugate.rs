@@ -7,6 +7,7 @@ use crate::algebra::planar::Space;
 use crate::dynamics::{accelerate, bring_inward};
 use crate::lanes::Real;
 use crate::sim::Sim;
+use crate::solver::coupled;
 use crate::state::{Capped, Work};
 
 /// Lower bound on the previous direction's share in the next one.
@@ -20,6 +21,9 @@ pub(super) fn precondition<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, 
     }
     work.solver.link_force.fill([T::zero(); 6]);
     bring_inward::<T, S>(sim, work);
+    if sim.inertia_blocks > 0 {
+        coupled::correct(sim, work, false);
+    }
     accelerate::<T, S>(sim, work);
 }
 

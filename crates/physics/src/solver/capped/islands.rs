@@ -2,7 +2,7 @@
 //! convergence check.
 
 use crate::lanes::{Real, kernel_fn};
-use crate::rows::Jacobian;
+use crate::rows::{Jacobian, Source};
 use crate::sim::Sim;
 use crate::state::{Capped, Work};
 
@@ -28,6 +28,10 @@ kernel_fn! {
         c.first_home.clear();
         for b in work.rows.blocks.iter() {
             c.first_home.push(c.homes.len());
+            // inertia is no constraint
+            if b.source == Source::TendonInertia {
+                continue;
+            }
             let on = T::bits(b.on);
             match &b.jacobian {
                 Jacobian::Points { sides, .. } => {

@@ -15,6 +15,7 @@
 //! over the momenta of links.
 
 mod conjugate;
+mod inertia;
 mod islands;
 mod line;
 mod stages;
@@ -104,6 +105,9 @@ fn smooth<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped<T>
         (dof.diag, dof.rhs) = (T::splat(*armature), *force);
     }
     factorize::<T, S>(sim, work, false);
+    if sim.inertia_blocks > 0 {
+        inertia::factorize(sim, work);
+    }
     accelerate::<T, S>(sim, work);
     c.smooth.copy_from_slice(&work.solver.solution);
     c.smooth_acc.copy_from_slice(&work.solver.link_acc);
@@ -137,6 +141,7 @@ fn start<T: Real, S: Space>(sim: &Sim<T>, group: &Group<T>, work: &mut Work<T>, 
             let away = work.solver.qacc[d] - c.smooth[d];
             masses = (T::splat(sim.armature[d]) * away).mul_add(away, masses);
         }
+        masses += inertia::twice_cost(sim, work, c);
         cost += masses * T::lit(0.5);
         by_smooth = cost_smooth.lt(cost);
         stages::choose(work, by_smooth);
@@ -164,6 +169,7 @@ fn scales<T: Real, S: Space>(sim: &Sim<T>, caps: &Caps, work: &Work<T>, c: &mut 
     }
     let sums = &mut c.sums;
     for_each_diagonal::<T, S>(sim, work, &mut c.composite, |tree, x| sums[tree][0] += x);
+    inertia::add_diagonal(sim, work, c);
     islands::gather(&c.island, &mut c.sums);
     for tree in 0..sim.trees {
         for lane in 0..T::LANES {
@@ -223,6 +229,7 @@ fn gradient<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped<
             S::add(&mut work.solver.link_force[p], &f);
         }
     }
+    inertia::add_gradient(sim, work, c);
 }
 
 /// The squared gradient of each island.
@@ -294,6 +301,7 @@ fn way<T: Real, S: Space>(sim: &Sim<T>, work: &mut Work<T>, c: &mut Capped<T>) {
             c.sums[tree][1] = step.mul_add(step, c.sums[tree][1]);
         }
     }
+    inertia::add_way(sim, work, c);
     islands::gather(&c.island, &mut c.sums);
     stages::measure_way(work, c);
 }

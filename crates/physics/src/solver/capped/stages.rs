@@ -1,7 +1,7 @@
 //! The parts of the iteration that loop over all rows.
 
 use crate::lanes::{Real, kernel_fn};
-use crate::rows::{Block, Jacobian, RowCost};
+use crate::rows::{Block, Jacobian, RowCost, Source};
 use crate::sim::Sim;
 use crate::state::{Capped, Work};
 
@@ -107,7 +107,8 @@ kernel_fn! {
         for b in work.rows.blocks.iter_mut() {
             b.activate(all);
             b.moved = all;
-            b.force = b.true_force(&b.u);
+            // the force of inertia is one of the masses
+            b.force = if b.source == Source::TendonInertia { [T::zero(); 6] } else { b.true_force(&b.u) };
         }
     }
 }

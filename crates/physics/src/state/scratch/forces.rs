@@ -1,7 +1,7 @@
 //! Forces on joints and links that do not come from constraints.
 
 use super::Drives;
-use crate::algebra::spatial::V6;
+use crate::algebra::spatial::{V3, V6, cross_add};
 use crate::lanes::Real;
 use crate::sim::Sim;
 
@@ -32,6 +32,8 @@ pub(crate) struct Forces<T: Real> {
     /// External torque and force on every link: gravity compensation, fluid, and pushes (`xfrc_applied`). Empty for
     /// none.
     pub link_applied: Vec<V6<T>>,
+    /// Gravity compensation of the degrees of freedom, as passive and as actuator forces. Empty if the latter are.
+    pub gravcomp: [Vec<T>; 2],
     /// Force of each actuator.
     pub actuator_force: Vec<T>,
 }
@@ -53,7 +55,18 @@ impl<T: Real> Forces<T> {
             minus_drive_deriv: vec![z; sim.drives.len()],
             tendon_share: vec![[T::lit(1.0); 2]; sim.tendons.len()],
             link_applied: Vec::with_capacity(nl),
+            gravcomp: [vec![z; sim.actuated_gravcomp.len()], vec![z; sim.actuated_gravcomp.len()]],
             actuator_force: vec![z; sim.model.nu],
+        }
+    }
+
+    /// Adds a force at a point of a link, and a torque, to [`link_applied`](Forces::link_applied).
+    #[inline(always)]
+    pub fn push(&mut self, link: usize, r: &V3<T>, force: &V3<T>, torque: &V3<T>) {
+        let t = cross_add(r, force, torque);
+        for i in 0..3 {
+            self.link_applied[link][i] += t[i];
+            self.link_applied[link][3 + i] += force[i];
         }
     }
 }

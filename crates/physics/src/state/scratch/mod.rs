@@ -6,6 +6,7 @@ mod contacts;
 mod dof;
 mod drives;
 mod forces;
+mod implicit;
 mod motion;
 mod readings;
 mod rk4;
@@ -19,12 +20,13 @@ pub(crate) use contacts::GeomContacts;
 pub(crate) use dof::DofWork;
 pub(crate) use drives::Drives;
 pub(crate) use forces::Forces;
+pub(crate) use implicit::Implicit;
 pub(crate) use motion::Motion;
 pub(crate) use readings::Measured;
 pub(crate) use rk4::Rk4;
 pub(crate) use slip::{Law, MOST_ROWS, Patch, Place, Slip, SlipLane};
 pub(crate) use solver::Solver;
-pub(crate) use strings::{DampedTendons, Strings};
+pub(crate) use strings::Strings;
 
 use super::stats::SolverStats;
 use crate::algebra::spatial::V6;
@@ -42,7 +44,7 @@ pub struct Work<T: Real> {
     pub(crate) strings: Strings<T>,
     pub(crate) drives: Drives<T>,
     pub(crate) adhesion: Adhesion<T>,
-    pub(crate) damped_tendons: DampedTendons<T>,
+    pub(crate) implicit: Implicit<T>,
     pub(crate) solver: Solver<T>,
     pub(crate) contacts: GeomContacts<T>,
     pub(crate) readings: Measured<T>,
@@ -71,7 +73,7 @@ impl<T: Real> Work<T> {
             strings: Strings::new(sim),
             drives: Drives::new(sim),
             adhesion: Adhesion::new(sim),
-            damped_tendons: DampedTendons::new(sim),
+            implicit: Implicit::new(sim),
             solver: Solver::new(sim),
             contacts: GeomContacts::new(sim),
             readings: Measured::new(sim),
