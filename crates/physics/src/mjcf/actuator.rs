@@ -1,6 +1,8 @@
 //! `<actuator>`: motors, servos and muscles on joints, tendons and sites.
 
 use super::actuator_params::{ActuatorParams, Limits};
+use super::compiler::Settings;
+use super::compiler::Tristate;
 use super::defaults::Defaults;
 use super::document::Element;
 use super::error::MjcfError;
@@ -11,10 +13,10 @@ use super::muscle;
 use super::names::Registry;
 use super::pose::Pose;
 use super::room::Room;
-use super::settings::{Settings, entries};
+use super::settings::entries;
 use super::tendon::Moments;
 use super::transmission;
-use super::value::{Attrs, Tristate, polynomial};
+use super::value::{Attrs, polynomial};
 use crate::model::{Actuator, Dynamics, JointType, Model, Muscle, Transmission};
 
 /// All elements of `<actuator>` sections.

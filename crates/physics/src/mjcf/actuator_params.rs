@@ -1,10 +1,11 @@
 //! Gain, bias and activation of actuators, assembled from classes and shortcuts.
 
+use super::compiler::Tristate;
 use super::document::{Attr, Element};
 use super::error::MjcfError;
 use super::muscle;
 use super::schema::NO_ACTUATOR;
-use super::value::{Attrs, Tristate};
+use super::value::Attrs;
 use crate::hint::{did_you_mean, nearest};
 use crate::model::Dynamics;
 use std::f64::consts::PI;

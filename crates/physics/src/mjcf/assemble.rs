@@ -1,5 +1,6 @@
 //! From the parts of the file to the [`Model`].
 
+use super::compiler::Settings;
 use super::defaults::{ACTUATORS, Defaults};
 use super::document::Element;
 use super::error::MjcfError;
@@ -9,7 +10,7 @@ use super::joint::JointSpec;
 use super::math::{Frame, IDENTITY, MIN_VAL};
 use super::names::{Names, Registry};
 use super::room::Room;
-use super::settings::{Settings, entries};
+use super::settings::entries;
 use super::tree::{BodySpec, CameraSpec, LightSpec, SiteSpec};
 use super::value::Attrs;
 use super::{

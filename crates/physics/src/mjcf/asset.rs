@@ -1,5 +1,6 @@
 //! `<asset>`: height fields and meshes.
 
+use super::compiler::Settings;
 use super::defaults::Defaults;
 use super::document::Element;
 use super::error::MjcfError;
@@ -8,7 +9,7 @@ use super::math::EPS;
 use super::mesh::{self, MeshAsset};
 use super::names::Names;
 use super::room::Room;
-use super::settings::{Settings, entries};
+use super::settings::entries;
 use super::value::{Attrs, numbers};
 use crate::model::HField;
 

@@ -1,8 +1,8 @@
 //! The XML document: elements with their places, `<include>` already expanded.
 
+use super::compiler::Settings;
 use super::error::{MjcfError, MjcfErrorKind, shorten};
 use super::room::{ELEMENT, Room};
-use super::settings::Settings;
 use super::xml::{self, MAX_ATTRIBUTES};
 use crate::hint::nearest;
 use std::collections::BTreeSet;

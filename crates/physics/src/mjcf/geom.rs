@@ -1,13 +1,13 @@
 //! `<geom>` and `<site>`: shape, place, mass and inertia.
 
 use super::asset::Assets;
+use super::compiler::Settings;
 use super::document::Element;
 use super::error::MjcfError;
 use super::fluid;
 use super::math::*;
 use super::mesh::{Content, MeshAsset};
 use super::orientation::orientation;
-use super::settings::Settings;
 use super::solver_params::{SOLIMP, SOLREF};
 use super::value::Attrs;
 use crate::model::{GeomType, Quat, SolImp, SolRef, Vec3};

@@ -1,10 +1,10 @@
 //! Mass and inertia of bodies: from `<inertial>` or from their geoms, then bounded, balanced and scaled.
 
+use super::compiler::Settings;
+use super::compiler::Tristate;
 use super::error::MjcfError;
 use super::math::*;
-use super::settings::Settings;
 use super::tree::BodySpec;
-use super::value::Tristate;
 
 /// Fills in mass, inertial frame and principal moments of all bodies.
 pub(crate) fn compile(bodies: &mut [BodySpec], settings: &Settings) -> Result<(), MjcfError> {

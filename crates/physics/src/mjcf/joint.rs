@@ -1,10 +1,10 @@
 //! `<joint>` and `<freejoint>`.
 
+use super::compiler::Settings;
 use super::document::Element;
 use super::error::MjcfError;
 use super::limit::{check_limit, check_switch, is_limited};
 use super::math::{EPS, Frame, rotate, unit};
-use super::settings::Settings;
 use super::solver_params::{SOLIMP, SOLREF};
 use super::value::{Attrs, polynomial};
 use crate::model::{JointType, SolImp, SolRef, Vec3};

@@ -1,8 +1,9 @@
 //! Ranges with a switch, such as `range` and `limited`: whether they apply, and the checks of both.
 
+use super::compiler::Settings;
+use super::compiler::Tristate;
 use super::error::MjcfError;
-use super::settings::Settings;
-use super::value::{Attrs, Tristate};
+use super::value::Attrs;
 
 /// Whether a range applies: as switched, or as it is given when the switch is `auto`.
 pub(crate) fn is_limited(attrs: &Attrs, switch: &str, range: [f64; 2]) -> Result<bool, MjcfError> {

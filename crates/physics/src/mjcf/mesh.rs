@@ -3,12 +3,13 @@
 //! The order is MuJoCo's. The hull is found in the file's frame. Then `refpos`, `refquat` and `scale` apply, and the mesh moves to its
 //! center of mass and turns to its principal axes. At last its points are rounded to single precision.
 
+use super::compiler::Settings;
 use super::document::Element;
 use super::error::{MjcfError, MjcfErrorKind};
 use super::file::ReadFile;
 use super::math::*;
 use super::room::Room;
-use super::settings::{Settings, sections};
+use super::settings::sections;
 use super::value::Attrs;
 use crate::mesh::builtin::{self, Builtin};
 use crate::mesh::moments::{self, Inside};

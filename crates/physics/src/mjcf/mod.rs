@@ -18,6 +18,7 @@ mod actuator;
 mod actuator_params;
 mod assemble;
 mod asset;
+mod compiler;
 mod contact;
 mod custom;
 mod defaults;

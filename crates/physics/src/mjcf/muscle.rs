@@ -1,5 +1,6 @@
 //! `<muscle>`: the numbers of its force, and the range of its lengths.
 
+use super::compiler::LengthRange;
 use super::document::Element;
 use super::error::MjcfError;
 use super::value::Attrs;
@@ -52,20 +53,7 @@ pub(crate) fn muscle(element: &Element, numbers: &[f64; 10], length_range: [f64;
     Ok(Muscle { length_range, range: [low, high], force, lmin, lmax, vmax, fpmax, fvmax })
 }
 
-/// `<compiler><lengthrange>`: where the range of a muscle's lengths is from.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct LengthRange {
-    /// Whether anything but the file may set it.
-    computed: bool,
-    /// Whether a range in the file counts.
-    existing: bool,
-    /// Whether the limits of the joint or tendon count.
-    limits: bool,
-}
-
 impl LengthRange {
-    pub const DEFAULT: LengthRange = LengthRange { computed: true, existing: true, limits: false };
-
     /// Takes over what an element sets.
     pub fn apply(&mut self, element: &Element) -> Result<(), MjcfError> {
         let attrs = Attrs::plain(element);

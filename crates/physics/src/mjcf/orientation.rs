@@ -1,9 +1,9 @@
 //! The five ways to write an orientation.
 
+use super::compiler::Settings;
 use super::document::Element;
 use super::error::MjcfError;
 use super::math::*;
-use super::settings::Settings;
 use super::value::Attrs;
 use crate::model::{Quat, Vec3};
 

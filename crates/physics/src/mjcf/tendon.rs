@@ -1,5 +1,6 @@
 //! `<tendon>`: linear combinations of joints, and strings through sites.
 
+use super::compiler::Settings;
 use super::defaults::Defaults;
 use super::document::Element;
 use super::error::MjcfError;
@@ -7,7 +8,7 @@ use super::limit::{check_limit, is_limited};
 use super::names::Registry;
 use super::pose::Pose;
 use super::room::Room;
-use super::settings::{Settings, entries};
+use super::settings::entries;
 use super::solver_params::{SOLIMP, SOLREF};
 use super::tendon_path;
 use super::value::{Attrs, numbers, polynomial};

@@ -1,6 +1,7 @@
 //! `<worldbody>`: the tree of bodies, read depth first.
 
 use super::asset::Assets;
+use super::compiler::Settings;
 use super::defaults::Defaults;
 use super::document::Element;
 use super::error::MjcfError;
@@ -8,7 +9,7 @@ use super::geom::{GeomSpec, ShapeSpec};
 use super::joint::JointSpec;
 use super::math::*;
 use super::orientation::orientation;
-use super::settings::{Settings, sections};
+use super::settings::sections;
 use super::value::Attrs;
 use crate::model::{JointType, TrackMode, Vec3};
 

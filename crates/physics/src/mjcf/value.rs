@@ -1,5 +1,6 @@
 //! Attribute values: a text becomes numbers, a flag or a keyword, with defaults of classes laid underneath.
 
+use super::compiler::Tristate;
 use super::document::{Attr, Element};
 use super::error::MjcfError;
 use crate::hint::{did_you_mean, nearest};
@@ -14,14 +15,6 @@ pub(crate) struct Attrs<'a> {
     pub element: &'a Element,
     /// `<default>` elements of the same kind, outermost class first.
     pub defaults: &'a [&'a Element],
-}
-
-/// A switch that may be left to the compiler.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Tristate {
-    False,
-    True,
-    Auto,
 }
 
 const FLAG: [(&str, bool); 2] = [("false", false), ("true", true)];

@@ -2,9 +2,9 @@
 //!
 //! The order is MuJoCo's: the world is read from its beginning to its end, and a copy holds what is there already.
 
+use super::super::compiler::Settings;
 use super::super::document::{Element, MAX_DEPTH};
 use super::super::error::MjcfError;
-use super::super::settings::Settings;
 use super::attach::{ClassNames, Key, Library};
 use super::kind::{Kind, WORLD};
 use super::references::Gone;

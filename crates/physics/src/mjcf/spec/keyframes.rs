@@ -1,6 +1,7 @@
 //! Keyframes keep their meaning: the numbers of a joint, mocap body or actuator come and go with it.
 
 use super::super::actuator_params::ActuatorParams;
+use super::super::compiler::Settings;
 use super::super::defaults::Defaults;
 use super::super::document::{Element, LISTS};
 use super::super::error::MjcfError;
@@ -8,7 +9,7 @@ use super::super::joint::JointSpec;
 use super::super::math::{Frame, IDENTITY};
 use super::super::orientation::orientation;
 use super::super::room::Room;
-use super::super::settings::{Settings, sections};
+use super::super::settings::sections;
 use super::super::value::Attrs;
 use super::walk::Path;
 use crate::model::{Dynamics, JointType};
@@ -44,7 +45,7 @@ impl Share {
     }
 }
 
-/// What each joint, mocap body and actuator adds to the lists, in their order.
+/// The numbers that each joint, mocap body and actuator adds to the lists, in their order.
 pub(super) fn at_rest(root: &Element, room: &Room) -> Result<Vec<(Path, Values)>, MjcfError> {
     let defaults = Defaults::read(root, room)?;
     let mut reader = Reader { defaults: &defaults, settings: Settings::read(root)?, values: Vec::new() };

@@ -123,7 +123,7 @@ impl ModelSpec {
         resolve: &dyn Fn(&str) -> Result<Vec<u8>, String>,
     ) -> Result<ModelSpec, MjcfError> {
         let room = Room::default();
-        let library = Library::new(resolve, &room);
+        let library = Library::new(resolve, expand::expand, &room);
         let mut root = document::parse(xml, name, "", &|file| super::utf8(resolve(file)?), &room)?;
         let keys = expand::expand(&mut root, "", &library)?;
         attach::write_keys(&mut root, &keys, &room)?;

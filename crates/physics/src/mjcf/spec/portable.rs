@@ -4,6 +4,7 @@
 //! outermost class move to a class of their own. Only settings that give masses cannot be written: bodies with other ones
 //! get an attribute that readers refuse.
 
+use super::super::compiler::Settings;
 use super::super::defaults::{Defaults, MAIN};
 use super::super::document::Element;
 use super::super::error::MjcfError;
@@ -11,7 +12,6 @@ use super::super::limit::is_limited;
 use super::super::orientation::euler_product;
 use super::super::room::Room;
 use super::super::schema::OTHER_MASS;
-use super::super::settings::Settings;
 use super::super::value::Attrs;
 use super::attach::class_names;
 use super::last_section;

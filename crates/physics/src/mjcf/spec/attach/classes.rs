@@ -3,7 +3,7 @@
 use super::super::super::defaults::MAIN;
 use super::super::super::document::Element;
 use super::super::default_classes;
-use super::library::Child;
+use super::child::Child;
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 

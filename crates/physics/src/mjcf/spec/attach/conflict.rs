@@ -1,4 +1,4 @@
-//! What becomes of an attached model's `<option>`, as `<compiler conflict>` of the enclosing model says.
+//! Merges the `<option>` of an attached model, as `<compiler conflict>` of the enclosing model says.
 //!
 //! | `conflict` | only the attached model sets it | both set it, to different values |
 //! |---|---|---|
@@ -136,7 +136,7 @@ fn last<'e>(root: &'e Element, section: &str, name: &str) -> Option<&'e Attr> {
     root.children.iter().rev().filter(|s| s.name == section).find_map(|s| s.attr(name))
 }
 
-/// Whether two lists are the same. What a short one leaves out is as in the default.
+/// Whether two lists are the same. A short one goes on as the default.
 fn equal(a: &str, b: &str, default: &str) -> bool {
     let words = |text: &str| -> Vec<String> {
         let given = text.split_ascii_whitespace();

@@ -81,7 +81,7 @@ pub(in super::super) fn forget(element: &mut Element) {
     element.children.iter_mut().for_each(forget);
 }
 
-/// The next numbers of a list. What a short list leaves out is at rest.
+/// The next numbers of a list. The rest of a short list is at rest.
 fn part(given: &[f64], start: &mut usize, rest: &[f64]) -> Vec<f64> {
     let numbers = (0..rest.len()).map(|i| given.get(*start + i).copied().unwrap_or(rest[i])).collect();
     *start += rest.len();

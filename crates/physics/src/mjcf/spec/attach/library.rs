@@ -1,12 +1,13 @@
 //! Models that others attach: found by name, read once per file.
 
+use super::super::super::compiler::Settings;
 use super::super::super::document::{self, Attr, Element, join, normalize};
 use super::super::super::error::{MjcfError, MjcfErrorKind, shorten};
 use super::super::super::room::Room;
 use super::super::super::schema;
-use super::super::super::settings::{Settings, entries};
+use super::super::super::settings::entries;
 use super::super::super::utf8;
-use super::super::expand;
+use super::child::Child;
 use super::keys::{self, Key};
 use crate::hint::nearest;
 use std::cell::{Cell, RefCell};
@@ -19,21 +20,13 @@ const MOST_LOOKS: usize = 20_000_000;
 /// Limit on models that attach models that attach models.
 const MAX_NESTED: usize = 20;
 
-/// A model that others attach, without copies and includes.
-pub(in super::super) struct Child {
-    pub root: Element,
-    /// Its file, relative to the main one.
-    pub file: String,
-    pub settings: Arc<Settings>,
-    /// Its keyframes, whose numbers are in its elements.
-    pub keys: Vec<Key>,
-    /// Number of its elements.
-    pub size: usize,
-}
+/// Expands the copies of a document, given the folder of its file, and returns the keyframes of attached models.
+pub(in super::super) type Expand = fn(&mut Element, &str, &Library) -> Result<Vec<Key>, MjcfError>;
 
 /// All models that a model and its parts attach, and what reading them may cost.
 pub(in super::super) struct Library<'a> {
     resolve: &'a dyn Fn(&str) -> Result<Vec<u8>, String>,
+    expand: Expand,
     pub room: &'a Room,
     looks: Cell<usize>,
     read: RefCell<BTreeMap<String, Rc<Child>>>,
@@ -42,9 +35,10 @@ pub(in super::super) struct Library<'a> {
 }
 
 impl<'a> Library<'a> {
-    pub fn new(resolve: &'a dyn Fn(&str) -> Result<Vec<u8>, String>, room: &'a Room) -> Library<'a> {
+    pub fn new(resolve: &'a dyn Fn(&str) -> Result<Vec<u8>, String>, expand: Expand, room: &'a Room) -> Library<'a> {
         Library {
             resolve,
+            expand,
             room,
             looks: Cell::new(0),
             read: RefCell::new(BTreeMap::new()),
@@ -134,7 +128,7 @@ impl<'a> Library<'a> {
     fn child(&self, text: &str, path: &str) -> Result<Child, MjcfError> {
         let folder = path.rfind('/').map_or("", |end| &path[..=end]);
         let mut root = document::parse(text, path, folder, &|file| utf8((self.resolve)(file)?), self.room)?;
-        let pending = expand::expand(&mut root, folder, self)?;
+        let pending = (self.expand)(&mut root, folder, self)?;
         check(&root)?;
         let settings = Settings { folder: folder.to_owned(), ..Settings::read(&root)? };
         let settings = Arc::new(settings);

@@ -8,6 +8,7 @@
 //! * Its `<option>` counts as `<compiler conflict>` says. By default, the enclosing model's counts.
 //! * Its keyframes become keyframes of the enclosing model, in which all else is at rest.
 
+mod child;
 mod classes;
 mod conflict;
 mod follow;
@@ -29,7 +30,7 @@ use super::part::{Draft, set};
 use super::references::Gone;
 use super::walk::{self, Path};
 use crate::hint::nearest;
-use library::Child;
+use child::Child;
 use prefix::Prefix;
 use std::collections::BTreeSet;
 
@@ -93,6 +94,7 @@ impl Expansion<'_> {
         if part.is_some_and(|part| part.name == "body" && part.value == WORLD) {
             let mut world = Draft::new("body").with("name", WORLD).placed(&attach.place);
             world.children = parts;
+            world.settings = Some(child.settings.clone());
             parts = vec![world];
         }
         let frame = self.framed(attach, parts, class, &prefix)?;
