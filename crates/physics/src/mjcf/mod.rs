@@ -6,7 +6,7 @@
 //! # Ok::<(), marathon_physics::mjcf::MjcfError>(())
 //! ```
 //!
-//! The way of a file: `document` parses the XML (with `xml`) and expands includes, `schema` refuses what is misspelled or not
+//! The way of a file: `document` parses the XML (with `xml`) and expands includes, `settings` reads the options and fills `compiler`, `schema` refuses what is misspelled or not
 //! supported, `defaults` lays classes under elements, `tree` reads the bodies, `inertia` gives them mass,
 //! `asset` (with `mesh`), `tendon` (with `tendon_path`), `equality`, `actuator` (with `transmission` and `muscle`), `sensor` and `custom` read the rest, `assemble` puts the [`Model`] together,
 //! `mass_matrix` (with `pose` and `factor`) and `statistics` compute what follows from the reference configuration. `room` counts the memory

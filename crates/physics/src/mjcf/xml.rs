@@ -32,8 +32,11 @@ pub(super) fn repaired(text: &str) -> Result<Cow<'_, str>, usize> {
             repairs.declaration(start)
         } else if rest.starts_with("</") {
             let end = behind(text, start, ">");
-            if closed && is_only_end_tags(&text[end..]) {
-                repairs.blank(start..end);
+            if closed {
+                if are_end_tags(&text[start..]) {
+                    repairs.blank(start..text.len());
+                }
+                break;
             }
             open = open.saturating_sub(1);
             closed |= open == 0;
@@ -56,9 +59,13 @@ fn behind(text: &str, from: usize, end: &str) -> usize {
     text[from..].find(end).map_or(text.len(), |i| from + i + end.len())
 }
 
-/// Whether nothing but end tags follows.
-fn is_only_end_tags(text: &str) -> bool {
-    text.split_ascii_whitespace().all(|word| word.starts_with("</") && word.ends_with('>'))
+/// Whether a text consists of end tags.
+fn are_end_tags(text: &str) -> bool {
+    let is_open_end_tag = |tag: &str| tag.trim_ascii().strip_prefix("</").is_some_and(|name| !name.contains('<'));
+    match text.trim_ascii_end().strip_suffix('>') {
+        Some(tags) => tags.split('>').all(is_open_end_tag),
+        None => false,
+    }
 }
 
 fn line(text: &str, at: usize) -> usize {
@@ -142,12 +149,12 @@ mod tests {
     #[test]
     fn text_with_one_meaning_becomes_well_formed() {
         for (text, expected) in [
-            ("<a><!-- x -- y\n-z- --></a>", "<a><!-- x    y\n z   --></a>"),
-            ("<a><!-\\- x\n -\\-><b/></a>", "<a>        \n     <b/></a>"),
+            ("<a><!-- x -- y\n-z- --></a>", "<a><!-- x    y\n z  --></a>"),
+            ("<a><!-\\- x\n -\\-><b/></a>", "<a>       \n     <b/></a>"),
             ("<!DOCTYPE mujoco><a/>", "                 <a/>"),
             ("<a b=\"1\"c='2'/>", "<a b=\"1\" c='2'/>"),
             ("<a>\n</a>\n</a>\n", "<a>\n</a>\n    \n"),
-            ("<a/></b> </c>", "<a/>         "),
+            ("<a/></b> </c>\n</d>", "<a/>         \n    "),
         ] {
             assert_eq!(repaired(text).as_deref(), Ok(expected));
             assert!(roxmltree::Document::parse(expected).is_ok(), "{expected}");
@@ -161,6 +168,8 @@ mod tests {
             "<?xml version=\"1.0\"?><a/>",
             "<!DOCTYPE a [<!ENTITY b \"c\">]><a/>",
             "<a/></a> text",
+            "<a/></a>text</a>",
+            "<a/></a><b/></a>",
             "<a></a><a/>",
             "<a>\"b\"c</a>",
             "<a b=\"",

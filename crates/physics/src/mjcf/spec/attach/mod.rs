@@ -34,6 +34,9 @@ use child::Child;
 use prefix::Prefix;
 use std::collections::BTreeSet;
 
+/// Looks that take as long as a copy of an element.
+const LOOKS: usize = 10;
+
 impl Expansion<'_> {
     /// Puts the attached part in the place of the `<attach>` with this index among the parts of an element. Returns 1, the
     /// number of elements there.
@@ -71,7 +74,7 @@ impl Expansion<'_> {
     ) -> Result<Element, MjcfError> {
         let child = self.library.find(self.root, self.folder, attach, model)?;
         conflict::resolve(self.root, &child.root, attach)?;
-        self.library.look(attach, child.size)?;
+        self.library.look(attach, LOOKS * child.size)?;
         let mut source = match self.sources.remove(&model.value) {
             Some(source) => source,
             None => {
@@ -121,7 +124,7 @@ impl Expansion<'_> {
         keys::forget(walk::at_mut(self.root, &path));
         let sections: Vec<Element> =
             self.root.children.iter().filter(|s| FOLLOWERS.contains(&s.name.as_str())).cloned().collect();
-        self.library.look(attach, sections.iter().map(|section| section.children.len()).sum())?;
+        self.library.look(attach, LOOKS * sections.iter().map(|section| section.children.len()).sum::<usize>())?;
         let sections = Element { children: sections, ..attach.clone() };
         let copied = self.follow(&sections, &prefix)?;
         forget_followers(self.root, &copied);
