@@ -567,6 +567,27 @@ fn adhesion() {
     }
 }
 
+/// Armature of tendons that the simulator refuses.
+#[test]
+fn armature_of_tendons() {
+    let model = |option: &str, joints: &str| {
+        let arm = |name: &str, more: &str| format!("<body><joint name='{name}'/><geom size='1'/>{more}</body>");
+        let tree = arm("trunk", &(arm("left", "") + &arm("right", "")));
+        let terms: String = joints.split(' ').map(|j| format!("<joint joint='{j}' coef='1'/>")).collect();
+        let text = format!(
+            "<mujoco><option {option}/><worldbody>{tree}</worldbody><tendon><fixed name='t' armature='1'>{terms}</fixed></tendon></mujoco>"
+        );
+        let model = Model::from_xml_str(&text, "tendon.xml").expect("a model");
+        Sim::<f64>::new(&model, SimOptions::default()).map(|_| ()).map_err(|error| error.to_string())
+    };
+    assert_eq!(model("", "trunk left"), Ok(()));
+    assert_eq!(model("iterations='3'", "left right"), Ok(()));
+    let branches = model("", "right trunk left").expect_err("it is refused");
+    assert!(branches.contains("armature of tendon 't' on several branches and on what carries them"), "{branches}");
+    let sweeps = model("noslip_iterations='3'", "left right").expect_err("it is refused");
+    assert!(sweeps.contains("armature of tendon 't' with noslip_iterations"), "{sweeps}");
+}
+
 /// Numbers of muscles.
 #[test]
 fn muscles() {
