@@ -12,22 +12,30 @@
 //! replay" (2021) and "Replay-guided adversarial environment design" (maximum Monte Carlo regret, 2021); Parker-Holder and
 //! others, "Evolving curricula with regret-based environment design" (ACCEL, 2022).
 
-use super::pieces::{self, Piece};
+use super::pieces::{self, Piece, PieceKind};
 use crate::episode_rng::EpisodeRng;
 
 /// Number of records.
 pub(super) const RECORDS: usize = 24;
 /// Slots of a record: its piece, trials, passes, best return, sum of returns and age.
 const RECORD: usize = pieces::SLOTS + 5;
-/// Slots of a bank.
-pub(super) const SLOTS: usize = RECORDS * RECORD;
-/// Share of a trial's weight that remains after another trial: half after twenty.
-const KEPT: f64 = 0.965_936_328_924_846;
-/// Weight of what is not known yet, and share of the weight of a piece that is hardly ever passed.
+/// Slots of a bank: its records and its skills.
+pub(super) const SLOTS: usize = RECORDS * RECORD + KINDS;
+const KINDS: usize = PieceKind::ALL.len();
+/// Share of a trial's weight that remains after another trial: half after eight.
+const KEPT: f64 = 0.917_004_043_204_671_2;
+/// Weight of what is not known yet.
 const UNKNOWN: f64 = 0.05;
-const HARDLY: f64 = 0.3;
-/// Trials after which a record may be replaced, and after which an edited record may have a child.
-const TRIED: f64 = 3.5;
+/// Trials after which a record may be replaced, and after which it may have a child.
+const TRIED: f64 = 0.5;
+const KNOWN: f64 = 1.5;
+/// Skill before the first trial, its largest change by a trial, and the range of sizes over which the probability to pass
+/// falls from 0.73 to 0.27.
+const NOVICE: f64 = 0.1;
+const RATE: f64 = 0.05;
+const WIDTH: f64 = 0.1;
+/// Weight of a skill in a pass rate, in trials.
+const PRIOR: f64 = 2.0;
 
 /// How records are scored and where new ones come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +46,11 @@ pub enum Rule {
     Plr,
     /// Edited levels.
     Accel,
+}
+
+/// A value in single precision, in which lanes store the memory.
+fn single(x: f64) -> f64 {
+    f64::from(x as f32)
 }
 
 /// A piece with its outcomes.
@@ -69,30 +82,18 @@ impl Record {
         self.age = 0.0;
     }
 
-    /// Estimate of the probability to pass.
-    pub fn pass_rate(&self) -> f64 {
-        (self.passes + 1.0) / (self.trials + 2.0)
-    }
-
-    /// Score under a rule.
-    pub fn score(&self, rule: Rule) -> f64 {
-        if rule == Rule::Plr {
-            return self.best - self.sum / (self.trials + 1.0);
-        }
-        let p = self.pass_rate();
-        let score = p * (1.0 - p) + UNKNOWN / libm::sqrt(self.trials + 1.0);
-        if p < 0.1 && self.trials > 8.0 { HARDLY * score } else { score }
-    }
-
-    /// Whether an edit of the piece is worth a try.
-    pub fn can_have_a_child(&self) -> bool {
-        self.trials > TRIED && (0.3..0.9).contains(&self.pass_rate())
+    /// Regret: the best return minus the mean, with one more return of 0 in the mean.
+    fn regret(&self) -> f64 {
+        self.best - self.sum / (self.trials + 1.0)
     }
 }
 
-/// The records of an agent.
+/// The records of an agent, and for each kind of piece its skill: the size that it passes half of the time.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Bank([Option<Record>; RECORDS]);
+pub(super) struct Bank {
+    records: [Option<Record>; RECORDS],
+    skills: [f64; KINDS],
+}
 
 impl Bank {
     /// Reads a bank from an agent's memory.
@@ -103,35 +104,72 @@ impl Bank {
             let &[trials, passes, best, sum, age] = rest else { return None };
             Some(Record { piece, trials, passes, best, sum, age })
         };
-        Bank(std::array::from_fn(|i| record(&slots[i * RECORD..(i + 1) * RECORD])))
+        let records = std::array::from_fn(|i| record(&slots[i * RECORD..(i + 1) * RECORD]));
+        // memory is zero at first
+        Bank { records, skills: std::array::from_fn(|i| slots[RECORDS * RECORD + i] + NOVICE) }
     }
 
     /// Writes the bank into an agent's memory, in single precision as lanes store it.
     pub fn write(&self, slots: &mut [f64]) {
-        for (slots, record) in slots.chunks_exact_mut(RECORD).zip(&self.0) {
+        let (records, skills) = slots.split_at_mut(RECORDS * RECORD);
+        for (slot, skill) in skills.iter_mut().zip(self.skills) {
+            *slot = single(skill - NOVICE);
+        }
+        for (slots, record) in records.chunks_exact_mut(RECORD).zip(&self.records) {
             slots.fill(0.0);
             if let Some(Record { piece, trials, passes, best, sum, age }) = record {
                 let (at, rest) = slots.split_at_mut(pieces::SLOTS);
                 piece.write(at);
-                rest.copy_from_slice(&[*trials, *passes, *best, *sum, *age].map(|x| f64::from(x as f32)));
+                rest.copy_from_slice(&[*trials, *passes, *best, *sum, *age].map(single));
             }
         }
     }
 
     /// A record.
     pub fn get(&self, i: usize) -> Option<&Record> {
-        self.0[i].as_ref()
+        self.records[i].as_ref()
+    }
+
+    /// Estimate of the probability to pass a piece, by the skill.
+    fn expected(&self, piece: &Piece) -> f64 {
+        1.0 / (1.0 + libm::exp((piece.size() - self.skills[piece.kind() as usize]) / WIDTH))
+    }
+
+    /// Estimate of the probability to pass the piece of a record, by its trials and the skill.
+    pub fn pass_rate(&self, record: &Record) -> f64 {
+        (record.passes + PRIOR * self.expected(&record.piece)) / (record.trials + PRIOR)
+    }
+
+    /// Score of a record under a rule.
+    pub fn score(&self, record: &Record, rule: Rule) -> f64 {
+        if rule == Rule::Plr {
+            return record.regret();
+        }
+        let p = self.pass_rate(record);
+        p * (1.0 - p) + UNKNOWN / libm::sqrt(record.trials + 1.0)
+    }
+
+    /// Whether an edit of a record's piece is worth a try.
+    pub fn can_have_a_child(&self, i: usize) -> bool {
+        let can = |record: &Record| record.trials > KNOWN && (0.3..0.9).contains(&self.pass_rate(record));
+        self.get(i).is_some_and(can)
+    }
+
+    /// Adjusts the skill to the outcome of a trial.
+    pub fn learn(&mut self, piece: &Piece, passed: bool) {
+        let surprise = f64::from(u8::from(passed)) - self.expected(piece);
+        self.skills[piece.kind() as usize] += RATE * surprise;
     }
 
     /// Share of the records in use.
     pub fn fill(&self) -> f64 {
-        self.0.iter().flatten().count() as f64 / RECORDS as f64
+        self.records.iter().flatten().count() as f64 / RECORDS as f64
     }
 
     /// Probability of each record to be drawn. Records that are not in use have none.
     pub fn probabilities(&self, rule: Rule) -> [f64; RECORDS] {
         let by_score = match rule {
-            Rule::Sfl | Rule::Accel => self.normalized(|_, record| record.score(rule)),
+            Rule::Sfl | Rule::Accel => self.normalized(|_, record| self.score(record, rule)),
             Rule::Plr => self.normalized(|i, record| 1.0 / self.rank(i, record) as f64),
         };
         let by_age = self.normalized(|_, record| record.age + 1.0);
@@ -141,17 +179,17 @@ impl Bank {
 
     /// Rank of a record's regret, 1 for the largest. Of equal ones, the first is higher.
     fn rank(&self, i: usize, record: &Record) -> usize {
-        let own = record.score(Rule::Plr);
+        let own = record.regret();
         let higher = |(k, other): (usize, &Option<Record>)| {
-            other.as_ref().map(|other| other.score(Rule::Plr)).is_some_and(|score| score > own || score == own && k < i)
+            other.as_ref().map(Record::regret).is_some_and(|score| score > own || score == own && k < i)
         };
-        1 + self.0.iter().enumerate().filter(|record| higher((record.0, record.1))).count()
+        1 + self.records.iter().enumerate().filter(|record| higher((record.0, record.1))).count()
     }
 
     /// Weights of the records, with the sum 1.
     fn normalized(&self, weight: impl Fn(usize, &Record) -> f64) -> [f64; RECORDS] {
         let weights: [f64; RECORDS] =
-            std::array::from_fn(|i| self.0[i].as_ref().map_or(0.0, |record| weight(i, record).max(1e-6)));
+            std::array::from_fn(|i| self.records[i].as_ref().map_or(0.0, |record| weight(i, record).max(1e-6)));
         let sum: f64 = weights.iter().sum();
         weights.map(|weight| if sum > 0.0 { weight / sum } else { 0.0 })
     }
@@ -159,7 +197,7 @@ impl Bank {
     /// Draws a record that is in use, given the probabilities.
     pub fn draw(&self, probabilities: &[f64; RECORDS], random: &mut EpisodeRng) -> Option<usize> {
         let mut left = random.uniform(0.0, 1.0);
-        let used = || self.0.iter().enumerate().filter(|(_, record)| record.is_some()).map(|(i, _)| i);
+        let used = || self.records.iter().enumerate().filter(|(_, record)| record.is_some()).map(|(i, _)| i);
         let drawn = used().find(|i| {
             left -= probabilities[*i];
             left < 0.0
@@ -170,30 +208,30 @@ impl Bank {
 
     /// Adds the outcome of a trial to a record.
     pub fn charge(&mut self, i: usize, passed: bool, earned: f64) {
-        if let Some(record) = &mut self.0[i] {
+        if let Some(record) = &mut self.records[i] {
             record.charge(passed, earned);
         }
     }
 
     /// Makes all records an episode older.
     pub fn grow_older(&mut self) {
-        self.0.iter_mut().flatten().for_each(|record| record.age += 1.0);
+        self.records.iter_mut().flatten().for_each(|record| record.age += 1.0);
     }
 
     /// Puts a record where none is, or in the place of the one with the lowest score if its own is not lower. Under rules
     /// that need an estimate, records with few trials stay, and so does `parent`.
     pub fn admit(&mut self, record: Record, rule: Rule, parent: Option<usize>) {
-        if let Some(free) = self.0.iter_mut().find(|record| record.is_none()) {
+        if let Some(free) = self.records.iter_mut().find(|record| record.is_none()) {
             *free = Some(record);
             return;
         }
         let may_go = |i: usize, known: &Record| Some(i) != parent && (rule == Rule::Plr || known.trials > TRIED);
-        let scores = self.0.iter().enumerate().filter_map(|(i, known)| Some((i, known.as_ref()?)));
-        let lowest = scores.filter(|(i, known)| may_go(*i, known)).map(|(i, known)| (i, known.score(rule)));
+        let scores = self.records.iter().enumerate().filter_map(|(i, known)| Some((i, known.as_ref()?)));
+        let lowest = scores.filter(|(i, known)| may_go(*i, known)).map(|(i, known)| (i, self.score(known, rule)));
         if let Some((i, score)) = lowest.min_by(|a, b| a.1.total_cmp(&b.1))
-            && record.score(rule) >= score
+            && self.score(&record, rule) >= score
         {
-            self.0[i] = Some(record);
+            self.records[i] = Some(record);
         }
     }
 }
@@ -220,20 +258,37 @@ mod tests {
 
     #[test]
     fn learnability_prefers_pieces_that_are_passed_half_of_the_time() {
-        let score = |passes| tried(1, 10, passes).score(Rule::Sfl);
-        assert!(score(5) > score(2) && score(5) > score(8) && score(2) > score(0) && score(8) > score(10));
-        // unknown pieces are worth a try
-        assert!(Record::new(piece(1)).score(Rule::Sfl) > score(5));
-        assert!(score(0) < 0.5 * score(10), "a piece that is never passed: {} {}", score(0), score(10));
+        let score = |passes| empty().score(&tried(1, 10, passes), Rule::Sfl);
+        assert!(score(5) > score(0) && score(5) > score(10) && score(2) > score(0));
+    }
+
+    /// Outcomes on pieces of a kind say what to expect of others.
+    #[test]
+    fn skills_predict_what_is_passed() {
+        let mut bank = empty();
+        let mut random = EpisodeRng::numbered(3);
+        for _ in 0..300 {
+            let piece = Piece::random(&[PieceKind::Gap], 1.0, &mut random);
+            bank.learn(&piece, piece.size() < 0.6);
+        }
+        let expected = |size: f64| {
+            let mut pieces = std::iter::repeat_with(|| Piece::random(&PieceKind::ALL, 1.0, &mut random));
+            let piece = pieces.find(|piece| piece.kind() == PieceKind::Gap && (piece.size() - size).abs() < 0.02);
+            bank.expected(&piece.unwrap())
+        };
+        let [small, middle, large] = [0.3, 0.6, 0.9].map(expected);
+        assert!(small > 0.85 && large < 0.15 && (0.3..0.7).contains(&middle), "{small} {middle} {large}");
+        let others = bank.skills.iter().enumerate().filter(|(i, _)| *i != PieceKind::Gap as usize);
+        assert!(others.into_iter().all(|(_, skill)| *skill == NOVICE), "{:?}", bank.skills);
     }
 
     #[test]
     fn regret_is_the_best_return_minus_the_mean() {
         let record = tried(1, 2, 1);
         let mean = (1.0 * KEPT + 0.2) / (KEPT + 1.0 + 1.0);
-        assert!((record.score(Rule::Plr) - (1.0 - mean)).abs() < 1e-12);
+        assert!((record.regret() - (1.0 - mean)).abs() < 1e-12);
         // passed always, or never: little to regret
-        let [always, never, half] = [10, 0, 5].map(|passes| tried(1, 10, passes).score(Rule::Plr));
+        let [always, never, half] = [10, 0, 5].map(|passes| tried(1, 10, passes).regret());
         assert!(half > 3.0 * always && half > 3.0 * never, "{always} {never} {half}");
     }
 
@@ -241,14 +296,14 @@ mod tests {
     fn probabilities_follow_scores_and_ages() {
         let mut bank = empty();
         for (i, passes) in [0, 5, 10].into_iter().enumerate() {
-            bank.0[2 * i] = Some(tried(i as u64, 10, passes));
+            bank.records[2 * i] = Some(tried(i as u64, 10, passes));
         }
         for rule in [Rule::Sfl, Rule::Plr, Rule::Accel] {
             let drawn = bank.probabilities(rule);
             assert!((drawn.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{rule:?}");
             assert!(drawn[2] > drawn[0] && drawn[2] > drawn[4] && drawn[1] == 0.0, "{rule:?}: {drawn:?}");
             let mut older = bank.clone();
-            older.0[4].as_mut().unwrap().age = 100.0;
+            older.records[4].as_mut().unwrap().age = 100.0;
             assert!(older.probabilities(rule)[4] > drawn[4] + 0.05, "{rule:?}");
             let mut counts = [0; RECORDS];
             let mut random = EpisodeRng::numbered(7);
@@ -265,24 +320,28 @@ mod tests {
     fn newcomers_replace_the_record_with_the_lowest_score() {
         let mut bank = empty();
         for i in 0..RECORDS {
-            bank.admit(tried(i as u64, 10, if i == 3 { 10 } else { 5 }), Rule::Sfl, None);
+            let mut record = Record::new(piece(i as u64));
+            (0..10).for_each(|trial| record.charge(i != 3 && trial % 2 == 0, 1.0));
+            bank.admit(record, Rule::Sfl, None);
         }
         assert_eq!(bank.fill(), 1.0);
-        // its parent stays
+        let newcomer = || tried(99, 6, 6);
         let before = bank.clone();
-        bank.admit(tried(99, 1, 1), Rule::Accel, Some(3));
-        assert_eq!(bank, before, "half of the others' trials are passes, which is worth more");
-        bank.admit(tried(99, 1, 1), Rule::Sfl, None);
-        assert!(bank.get(3).unwrap().piece == piece(99) && (0..RECORDS).all(|i| i == 3 || bank.0[i] == before.0[i]));
-        // too few trials to be replaced
-        bank.admit(tried(100, 1, 1), Rule::Sfl, None);
-        assert!(bank.get(3).unwrap().piece == piece(99));
+        bank.admit(newcomer(), Rule::Accel, Some(3));
+        assert_eq!(bank, before, "a parent stays, and the others are passed half of the time, which is worth more");
+        bank.admit(newcomer(), Rule::Sfl, None);
+        let others_stay = (0..RECORDS).all(|i| i == 3 || bank.records[i] == before.records[i]);
+        assert!(bank.get(3).unwrap().piece == piece(99) && others_stay);
+        // nothing is replaced before its first trial
+        bank.records[3] = Some(Record::new(piece(100)));
+        bank.admit(newcomer(), Rule::Sfl, None);
+        assert!(bank.get(3).unwrap().piece == piece(100));
     }
 
     #[test]
     fn old_trials_count_less() {
         let mut record = tried(1, 100, 0);
-        (0..20).for_each(|_| record.charge(true, 1.0));
+        (0..8).for_each(|_| record.charge(true, 1.0));
         assert!((record.passes - 0.5 * record.trials).abs() < 0.05 * record.trials, "{record:?}");
     }
 

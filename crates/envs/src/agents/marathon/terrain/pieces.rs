@@ -197,6 +197,11 @@ impl Piece {
         self
     }
 
+    /// Kind of the piece.
+    pub fn kind(&self) -> PieceKind {
+        self.kind
+    }
+
     /// Size of the piece as a share of the largest one at difficulty 1.
     pub fn size(&self) -> f64 {
         let of = |(x, number): (&f64, &Number)| match number.role {

@@ -52,8 +52,10 @@ const AHEAD: f64 = 0.5;
 const HORIZON: f64 = 1.0;
 /// Largest size of an easy piece as a share of the difficulty.
 const EASY: f64 = 0.25;
-/// Most children after an episode.
+/// Most children after an episode of `accel`; new pieces after one of `sfl`, and fresh ones from which each is chosen.
 const CHILDREN: usize = 3;
+const NEWCOMERS: usize = 2;
+const CANDIDATES: usize = 8;
 /// Number of seeds of courses. Lanes store them in single precision.
 const SEEDS: usize = 1 << 24;
 /// A place that no figure reaches, m.
@@ -81,7 +83,7 @@ impl Teacher {
         let mut random = EpisodeRng::numbered(seed as u64);
         let probabilities = bank.probabilities(self.rule);
         let [replayed, fresh] = match self.rule {
-            Rule::Sfl | Rule::Plr => [0.5, 0.6],
+            Rule::Sfl | Rule::Plr => [0.5, 0.3],
             Rule::Accel => [0.8, 0.0],
         };
         let replayed = bank.fill().min(replayed);
@@ -95,9 +97,21 @@ impl Teacher {
             }
             let (source, most) =
                 if random.uniform(0.0, 1.0) < fresh { (Source::Fresh, 1.0) } else { (Source::Easy, EASY) };
-            let share = random.uniform(0.0, most);
+            // fresh pieces have sizes of the full range
+            let share = if source == Source::Fresh { 1.0 } else { random.uniform(0.0, EASY) };
             (source, Piece::random(self.kinds, share * self.difficulty, &mut random))
         })
+    }
+
+    /// The most learnable one of some fresh pieces.
+    fn learnable(&self, bank: &Bank, random: &mut EpisodeRng) -> Record {
+        let mut fresh = || Record::new(Piece::random(self.kinds, self.difficulty, random));
+        let (mut best, score) = (fresh(), |record: &Record| bank.score(record, self.rule));
+        for _ in 1..CANDIDATES {
+            let other = fresh();
+            best = if score(&other) > score(&best) { other } else { best };
+        }
+        best
     }
 
     /// The bank after an episode that has left the memory `previous`.
@@ -116,12 +130,13 @@ impl Teacher {
                 std::cmp::Ordering::Equal => previous[EARNED],
                 std::cmp::Ordering::Greater => 0.0,
             };
+            bank.learn(&piece, passed);
             match source {
                 Source::Bank(record) => {
                     bank.charge(record, passed, earned);
                     replayed.push(record);
                 }
-                new if (new == Source::Easy) == (self.rule == Rule::Accel) => {
+                new if (new == Source::Easy) == (self.rule == Rule::Accel) && self.rule != Rule::Sfl => {
                     let mut record = Record::new(piece);
                     record.charge(passed, earned);
                     newcomers.push(record);
@@ -130,17 +145,23 @@ impl Teacher {
             }
         }
         if self.rule == Rule::Accel {
-            replayed.retain(|i| bank.get(*i).is_some_and(Record::can_have_a_child));
+            replayed.retain(|i| bank.can_have_a_child(*i));
             for _ in 0..CHILDREN.min(replayed.len()) {
                 let parent = replayed.swap_remove(random.whole(0, replayed.len() - 1));
                 if let Some(record) = bank.get(parent) {
-                    let child = record.piece.edited(record.pass_rate(), self.difficulty, random);
+                    let child = record.piece.edited(bank.pass_rate(record), self.difficulty, random);
                     bank.admit(Record::new(child), self.rule, Some(parent));
                 }
             }
         }
-        for record in newcomers {
-            bank.admit(record, self.rule, None);
+        match self.rule {
+            Rule::Sfl => (0..NEWCOMERS).for_each(|_| bank.admit(self.learnable(&bank, random), self.rule, None)),
+            // one of them: the others' places are needed until pieces are known well enough
+            _ if !newcomers.is_empty() => {
+                let record = newcomers.swap_remove(random.whole(0, newcomers.len() - 1));
+                bank.admit(record, self.rule, None);
+            }
+            _ => {}
         }
         bank
     }
