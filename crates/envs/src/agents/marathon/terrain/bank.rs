@@ -1,11 +1,14 @@
 //! The bank of an agent: pieces of courses with their outcomes. It lies in the agent's memory and is carried from episode
 //! to episode. Bits therefore do not depend on threads, and checkpoints contain it.
 //!
-//! A record has a pass rate p = (s + 1) / (n + 2) from n trials and s passes. Older trials count less.
+//! For each kind of piece, the bank has a *skill*: the size that the figure passes half of the time. A piece is expected to
+//! be passed with e = 1 / (1 + exp((size - skill) / 0.1)). Every outcome moves the skill by 0.05 times the surprise, as
+//! Elo's ratings of chess players. A record has a pass rate p = (s + 2 e) / (n + 2) from n trials and s passes. Older
+//! trials count less.
 //!
 //! | rule | score of a record | draws by score; by age |
 //! |---|---|---|
-//! | `sfl`, `accel` | learnability p (1 - p) + 0.05 / sqrt(n + 1), times 0.3 if p < 0.1 after ten trials | in proportion, 80 %; 20 % |
+//! | `sfl`, `accel` | learnability p (1 - p) + 0.05 / sqrt(n + 1) | in proportion, 80 %; 20 % |
 //! | `plr` | regret: best return on the piece minus its mean return, with one more return of 0 in the mean | 1 / rank, 70 %; 30 % |
 //!
 //! Sources: Rutherford and others, "No regrets" (sampling for learnability, 2024); Jiang and others, "Prioritized level

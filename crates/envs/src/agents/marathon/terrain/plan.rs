@@ -4,9 +4,14 @@
 //! | piece of a course | `sfl`, `plr` | `accel` |
 //! |---|---|---|
 //! | from the bank | 50 % | 80 % |
-//! | fresh: sizes up to a random share of `difficulty` | 30 % | |
-//! | easy: sizes up to a random share of a quarter of `difficulty` | 20 % | 20 % |
-//! | enters the bank | fresh pieces that were tried | easy pieces that were tried, and edits of replayed pieces |
+//! | fresh: sizes of the whole range | 15 % | |
+//! | easy: sizes up to a random share of a quarter of `difficulty` | 35 % | 20 % |
+//!
+//! | rule | enters the bank after an episode |
+//! |---|---|
+//! | `sfl` | twice the most learnable one of eight fresh pieces, before any trial |
+//! | `plr` | one of the fresh pieces that were tried |
+//! | `accel` | edits of up to three replayed pieces, and one of the easy pieces that were tried |
 //!
 //! Until the bank is full, pieces from it are rarer: at most the share of its records that are in use.
 //!
