@@ -6,11 +6,12 @@
 //! # Ok::<(), marathon_physics::mjcf::MjcfError>(())
 //! ```
 //!
-//! The way of a file: `document` parses the XML (with `xml`) and expands includes, `settings` reads the options and fills `compiler`, `schema` refuses what is misspelled or not
-//! supported, `defaults` lays classes under elements, `tree` reads the bodies, `inertia` gives them mass,
-//! `asset` (with `mesh`), `tendon` (with `tendon_path`), `equality`, `actuator` (with `transmission` and `muscle`), `sensor` and `custom` read the rest, `assemble` puts the [`Model`] together,
-//! `mass_matrix` (with `pose` and `factor`) and `statistics` compute what follows from the reference configuration. `room` counts the memory
-//! that all of them ask for. [`spec`] edits the document before it is compiled.
+//! The way of a file: `document` parses the XML (with `xml`) and expands includes, `spec` expands copies, `schema` refuses what is
+//! misspelled or not supported, `settings` reads the options and fills `compiler`, `defaults` lays classes under elements, `tree`
+//! reads the bodies, `inertia` gives them mass, `asset` (with `mesh`), `tendon` (with `tendon_path`), `equality`, `actuator` (with
+//! `transmission` and `muscle`), `sensor` and `custom` read the rest, `assemble` puts the [`Model`] together, `mass_matrix` (with
+//! `pose` and `factor`) and `statistics` compute what follows from the reference configuration. `room` counts the memory that all
+//! of them ask for. [`spec`] edits the document before it is compiled.
 //!
 //! An unsupported element or attribute that changes the dynamics is an error with file and line; it is never skipped.
 
