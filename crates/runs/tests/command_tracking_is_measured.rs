@@ -153,6 +153,10 @@ fn a_cart_with_a_lag_has_the_times_of_the_lag() {
         let expected = if jump > 0.3 { 0.1 + LAG * (jump / 0.3).ln() } else { 0.0 };
         assert!((time - expected).abs() < 0.15, "{push:?}: {expected}");
     }
+    let players: Vec<(&str, u64, f64)> =
+        got.players.iter().map(|player| (player.name.as_str(), player.falls, player.falls_per_minute)).collect();
+    let names = ["keyboard", "speed at 5 Hz", "full speed 0.2 s after a jump of 0.4 s"];
+    assert_eq!(players, names.map(|name| (name, 0, 0.0)));
     let text = got.table();
     assert!(text.contains("20 of 20 without a fall") && text.contains("-2.00 to  2.00"), "{text}");
 }
@@ -169,6 +173,13 @@ fn falls_are_counted_where_they_happen() {
         assert_eq!(r.error.is_none(), r.agents == 0, "{r:?}");
     }
     assert_eq!(got.stand.still, 20);
+    // full speed is too fast, unless the command changes before it is reached
+    assert_eq!(
+        got.players.iter().map(|player| (player.agents, player.falls)).collect::<Vec<_>>(),
+        [(20, 20), (20, 0), (20, 20)]
+    );
+    // every agent falls once, and within the first seconds
+    assert!((10.0..60.0).contains(&got.players[0].falls_per_minute), "{:?}", got.players);
     // all agents have fallen before a jump at 2 m/s
     assert_eq!(got.jumps.iter().map(|jump| (jump.agents, jump.falls)).collect::<Vec<_>>(), [(20, 0), (20, 0), (0, 0)]);
     // at 0.75 m/s, a push forward by 1 m/s is too much, one backward is not

@@ -4,6 +4,7 @@
 //! along the ground, or +x for planar characters. A command is observed at the end of the decision in which it is set,
 //! so a response includes this decision.
 
+mod players;
 mod response;
 mod results;
 mod table;
@@ -14,6 +15,7 @@ use crate::task_config::TaskConfig;
 use marathon_envs::{CommandRange, registry};
 use marathon_learn::{EvalOptions, Policy};
 use marathon_motion::Tracking;
+pub use players::Player;
 pub use response::Response;
 pub use results::{CommandTracking, Flip, Jump, Minutes, Push, Rise, Stand, Turn};
 use std::f64::consts::TAU;
@@ -55,6 +57,8 @@ const GOLDEN: f64 = 0.381_966_011_250_105 * TAU;
 
 /// Indices and ranges of speed and turn in a command.
 struct Commands {
+    /// Names, ranges and units.
+    ranges: Vec<CommandRange>,
     rest: Vec<f64>,
     speed: usize,
     range: [f64; 2],
@@ -77,6 +81,7 @@ impl Commands {
             turn: number_of(CommandRange::is_turn).map(|i| (i, spec.command[i].high)),
             button: number_of(CommandRange::is_button),
             backflip: spec.command.iter().position(|range| range.name == BACKFLIP),
+            ranges: spec.command,
         })
     }
 
@@ -144,6 +149,7 @@ pub fn measure(policy: &Policy, options: &EvalOptions) -> Result<CommandTracking
         agents: options.episodes as u64,
         dt: policy.meta().control_dt,
         minutes: minutes(trial()?)?,
+        players: players::all(&commands, trial)?,
         responses,
         turns,
         stand: stand(trial()?, &commands)?,

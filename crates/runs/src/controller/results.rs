@@ -1,6 +1,6 @@
 //! Results of a measurement of commands.
 
-use super::Response;
+use super::{Player, Response};
 use serde::Serialize;
 
 /// How well a policy tracks commands.
@@ -14,6 +14,8 @@ pub struct CommandTracking {
     pub dt: f64,
     /// A minute of random commands for each agent.
     pub minutes: Minutes,
+    /// Players whose commands are hard to follow.
+    pub players: Vec<Player>,
     /// Responses to speed steps.
     pub responses: Vec<Response>,
     /// The sharpest turns at each speed. Empty for planar characters.

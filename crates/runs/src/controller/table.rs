@@ -82,6 +82,13 @@ impl CommandTracking {
                 seconds(&p.recovery)
             );
         }
+        for p in &self.players {
+            let _ = write!(
+                out,
+                "\nplayer, {}: {} of {} fall, {:.2} falls per minute",
+                p.name, p.falls, p.agents, p.falls_per_minute
+            );
+        }
         if let Some(r) = &self.rise {
             let _ = write!(
                 out,

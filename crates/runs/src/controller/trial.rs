@@ -195,6 +195,28 @@ impl<'a> Trial<'a> {
         Ok(fell.map(|(_, time)| time.unwrap_or(f64::INFINITY)).collect())
     }
 
+    /// Gives all agents a number of commands for some seconds each. Returns the number of agents that stand in the end.
+    pub fn up(
+        &mut self,
+        commands: usize,
+        seconds: f64,
+        command: impl Fn(usize) -> Vec<f64>,
+    ) -> Result<usize, RunError> {
+        let mut gone = vec![false; self.agents()];
+        for turn in 0..commands {
+            self.command(|_| command(turn))?;
+            for _ in 0..(seconds / self.dt()).round() as usize {
+                self.play.decide();
+                self.play.step()?;
+                let last = self.play.last();
+                for (gone, ended) in gone.iter_mut().zip(last.terminated.iter().zip(&last.diverged)) {
+                    *gone |= *ended.0 || *ended.1;
+                }
+            }
+        }
+        Ok((0..gone.len()).filter(|agent| !gone[*agent] && !self.rises(*agent)).count())
+    }
+
     /// Motion of an agent since the last call.
     fn look(&mut self, agent: usize) -> Result<Moment, RunError> {
         let (qpos, dt) = (self.play.qpos(agent)?, self.dt());
