@@ -158,7 +158,7 @@ fn a_changed_stage_is_refused_until_it_may_be_made_again() {
     );
     let text = fail(path, 2, &["train", "small.yaml", "--redo", "folows"]);
     assert!(
-        text.contains("--redo is 'folows', expected a stage: runs, follows, races; did you mean follows?"),
+        text.contains("--redo is 'folows', expected a stage: runs, follows, races; did you mean 'follows'?"),
         "{text}"
     );
 
@@ -192,9 +192,10 @@ fn options_that_do_not_go_with_stages_are_refused() {
     }
     for (text, part) in [
         ("until: fals < 1", "a.yaml: stages.a.until: found 'fals', expected one of steps, return_mean"),
+        ("options: {x: 5}", "a.yaml: stages.a.options.x: found 5, expected no option, because Hopper-v0 has none"),
         (
-            "options: {max_episode_step: 5}",
-            "a.yaml: stages.a.options.max_episode_step: found 5, expected an option of Hopper-v0",
+            "task: AntController, options: {schedul: even}",
+            "stages.a.options.schedul: found even, expected an option of AntController-v0",
         ),
         ("initialize_from: none.safetensors", "none.safetensors"),
         ("config: none.yaml", "none.yaml"),

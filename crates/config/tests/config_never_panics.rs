@@ -1,17 +1,26 @@
 //! No bytes make the reader of configurations panic, and what it accepts is valid.
 
-use marathon_config::{default_for, parse, set};
+use marathon_config::{Recipe, default_for, parse, set};
 use proptest::prelude::*;
 use std::path::Path;
 
-const FILES: [&str; 3] = [
+const FILES: [&str; 5] = [
     include_str!("../../../assets/configs/paper-appendix-b.yaml"),
     include_str!("../../../assets/configs/hopper-fast.yaml"),
+    include_str!("../../../assets/configs/marathon_man_controller-recipe.yaml"),
+    "task: hopper\nstages: {a: {seeds: [1, 2], pick: lowest falls, until: falls < 1}, b: {average: [a/policies, a]}}\n",
     "behaviors: &b\n  Hopper: {max_steps: 5, <<: *b}\ndefault_settings: {hyperparameters: {beta: !!float 3}}\n",
 ];
 
 /// Pieces of which files are made.
-const PIECES: [&str; 43] = [
+const PIECES: [&str; 50] = [
+    "task: hopper\n",
+    "stages:",
+    "distill:",
+    "average:",
+    "seeds:",
+    "until:",
+    "falls < 1",
     "behaviors:",
     "Hopper:",
     "DeepMindHopperBrain:",
@@ -63,6 +72,18 @@ fn check(bytes: &[u8]) {
             Ok(loaded) => loaded.config.validate().unwrap(),
             Err(error) => assert!(error.to_string().starts_with("f.yaml"), "{error}"),
         }
+    }
+    match Recipe::parse(Path::new("f.yaml"), bytes) {
+        Ok(recipe) => {
+            for stage in &recipe.stages {
+                let settings = recipe.base(stage, None).and_then(|base| recipe.settings(stage, base));
+                match settings {
+                    Ok(loaded) => loaded.config.validate().unwrap(),
+                    Err(error) => assert!(error.to_string().starts_with("f.yaml"), "{error}"),
+                }
+            }
+        }
+        Err(error) => assert!(error.to_string().starts_with("f.yaml"), "{error}"),
     }
 }
 

@@ -61,15 +61,15 @@ stages:
 fn errors_name_the_stage_the_key_and_what_is_expected() {
     let stages = |text: &str| error(&format!("task: hopper\nstages:\n  one: {{}}\n  two: {text}\n"));
     for (text, part) in [
-        ("{stepz: 5}", "a.yaml:4: stages.two.stepz: unknown key; did you mean steps?"),
+        ("{stepz: 5}", "a.yaml:4: stages.two.stepz: unknown key; did you mean 'steps'?"),
         ("{steps: none}", "a.yaml:4: stages.two.steps: found 'none', expected a whole number above 0"),
         (
             "{initialize_from: onne}",
-            "found 'onne', expected an earlier stage (one) or a file with the ending .safetensors; did you mean one?",
+            "found 'onne', expected an earlier stage (one) or a file with the ending .safetensors; did you mean 'one'?",
         ),
         ("{initialize_from: two}", "found 'two', expected an earlier stage (one)"),
         ("{initialize_from: one/policies}", "expected one policy; only 'average' takes all policies of a stage"),
-        ("{hidden: [8]}", "stages.two.hidden: unknown key; did you mean network.hidden?"),
+        ("{hidden: [8]}", "stages.two.hidden: unknown key; did you mean 'network.hidden'?"),
         ("{distill: [one], average: [one]}", "expected distill or average in a stage, not both"),
         ("{distill: []}", "found an empty list"),
         ("{distill: one}", "found 'one', expected a list of stages or files"),

@@ -33,7 +33,7 @@ const OF_COMMANDS: [&str; 11] = [
     "rise.prompt",
 ];
 
-/// What is expected in place of a name that is no measure of a task, with the nearest name. `None` for a measure.
+/// The expected names in place of one that is no measure of a task, with the nearest. `None` for a measure.
 ///
 /// # Errors
 /// If the task cannot be created.
@@ -94,7 +94,7 @@ mod tests {
         assert_eq!(unknown("velocity_error", "MarathonManSteer"), None);
         assert_eq!(unknown("falls", "hopper"), None);
         let expected = unknown("fals", "hopper").unwrap();
-        assert!(expected.ends_with("did you mean falls?"), "{expected}");
+        assert!(expected.ends_with("did you mean 'falls'?"), "{expected}");
         let expected = unknown("stand.still", "hopper").unwrap();
         assert!(expected.starts_with("one of steps, return_mean"), "{expected}");
     }

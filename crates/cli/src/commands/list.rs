@@ -3,6 +3,7 @@
 use crate::error::CliError;
 use marathon_envs::{CommandRange, ObsGroup, OptionInfo, registry};
 use marathon_physics::lanes::Isa;
+use marathon_runs::recipe;
 use marathon_runs::terminal::{print_json, say};
 use serde::Serialize;
 
@@ -29,6 +30,9 @@ struct Entry {
     /// Lowest and highest action per actuator; null without bounds.
     action_range: Vec<[Option<f32>; 2]>,
     options: Vec<Argument>,
+    /// Stages of its recipe, if it has one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    recipe: Vec<String>,
     /// Facts that the task derives from its model, for tasks that take any model.
     #[serde(skip_serializing_if = "Option::is_none")]
     findings: Option<String>,
@@ -100,6 +104,8 @@ fn entry(name: &str) -> Result<Entry, CliError> {
         command: spec.command.iter().map(order).collect(),
         action_range: spec.action_low.iter().zip(&spec.action_high).map(range).collect(),
         options: agent.options().into_iter().map(argument).collect(),
+        recipe: recipe::of_task(name)
+            .map_or_else(Vec::new, |recipe| recipe.stages.into_iter().map(|stage| stage.name).collect()),
         findings: agent.findings(),
     })
 }
@@ -144,6 +150,9 @@ fn tell(e: &Entry) {
         if !names.is_empty() {
             say(format!("{what}\n  {}", names.join(", ")));
         }
+    }
+    if !e.recipe.is_empty() {
+        say(format!("stages of its recipe\n  {}", e.recipe.join(", ")));
     }
     if let Some(findings) = &e.findings {
         say("found in the model");

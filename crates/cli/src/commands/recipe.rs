@@ -97,6 +97,10 @@ pub fn run((recipe, options): (Recipe, RecipeOptions), args: &TrainArgs, json: b
     let summary = match run.carry_out(&mut front)? {
         End::Complete(summary) => summary,
         End::Stopped { number, of, stage } => {
+            if json {
+                let (folder, interrupted) = (run.folder().to_string_lossy(), true);
+                print_json(&serde_json::json!({ "folder": folder, "interrupted": interrupted, "stage": stage }));
+            }
             let resume = program::resume_command(run.folder());
             let text =
                 format!("stage {number} of {of}, {stage}, is not done; its state is saved; continue with {resume}");

@@ -3,6 +3,7 @@
 use super::stages::Recipe;
 use crate::names;
 use std::path::Path;
+use std::sync::LazyLock;
 
 macro_rules! file {
     ($name:literal) => {
@@ -27,15 +28,18 @@ const CONFIGS: [(&str, &str); 4] = [
     file!("marathon_man_controller-steady.yaml"),
 ];
 
+static READ: LazyLock<Vec<Recipe>> = LazyLock::new(|| {
+    let read = |(name, text): (&str, &str)| Recipe::parse(Path::new(name), text.as_bytes());
+    RECIPES.into_iter().map(|file| read(file).expect("the program's own recipes are right")).collect()
+});
+
 /// The recipe of a task, if it has one.
 ///
 /// # Panics
 /// If a recipe that is part of the program is wrong, which a test rules out.
 pub fn recipe_for(task: &str) -> Option<Recipe> {
     let id = names::id(task);
-    let read = |(name, text): (&str, &str)| Recipe::parse(Path::new(name), text.as_bytes());
-    let mut all = RECIPES.into_iter().map(|file| read(file).expect("the program's own recipes are right"));
-    all.find(|recipe| recipe.task == id)
+    READ.iter().find(|recipe| recipe.task == id).cloned()
 }
 
 /// The text of a recipe that comes with the program, or of a configuration that it names.

@@ -55,9 +55,9 @@ pub struct Stage {
     pub steps: Option<u64>,
     /// Seeds: one run for each. Empty: the seed of the settings.
     pub seeds: Vec<u64>,
-    /// What chooses a seed.
+    /// Measure that chooses a seed.
     pub pick: Option<Pick>,
-    /// What ends the stage before its last step.
+    /// Measure that ends the stage before its last step.
     pub until: Option<Criterion>,
     /// Whether the recipe fails if `until` is not reached.
     pub or_fail: bool,

@@ -1,6 +1,6 @@
-//! What a front end shows and decides while a recipe runs.
+//! The front end's part while a recipe runs.
 
-/// What a front end does while a recipe runs.
+/// The front end's part: it shows lines, and may stop the recipe.
 pub struct Front<'a> {
     /// Shows a line.
     pub note: &'a mut dyn FnMut(String),

@@ -1,8 +1,8 @@
 //! Recipes: stages that are trained one after the other into a folder.
 //!
-//! The folder of a recipe has a folder for each stage, such as `02-steady`. A stage that trains is a run like any other; its
-//! folder also has `stage.json`, everything that the stage is made from, and `done`, its result, which is written last. The
-//! same command skips stages that are done, and resumes the one that is not.
+//! The folder of a recipe has a folder for each stage, such as `02-steady`. A stage that trains is a run like any other. Its
+//! folder also has `stage.json`, everything that the stage is made from. The last file is `done`, its result. The same command
+//! skips stages that are done, and resumes the one that is not.
 
 mod front;
 mod lineage;
@@ -324,7 +324,7 @@ impl RecipeRun {
     }
 }
 
-/// What a kind of stage does.
+/// Work of a kind of stage, in a word.
 fn verb(kind: &str) -> &'static str {
     match kind {
         "distill" => "distilling",
