@@ -90,22 +90,24 @@ fn a_study_of_clips_makes_no_run_twice() {
     assert!(error.contains("did you mean 'walk'?"), "{error}");
 }
 
-/// A study of courses trains on each ground, also on that of an adversary, and evaluates the runners on new courses.
+/// A study of courses trains on each ground, also on that of an adversary, and evaluates the runners on new courses, made by
+/// hand and fresh ones.
 #[test]
 fn a_study_of_courses_judges_every_runner() {
     let folder = tempfile::tempdir().unwrap();
-    let words = ["assault-course", "--tasks", "TerrainHopper", "--grounds", "flat,adversary", "--seeds", "1"];
+    let words =
+        ["assault-course", "--tasks", "TerrainHopper", "--grounds", "flat,adversary", "--seeds", "1", "--fresh", "16"];
     let study = |more: &[&str]| {
         succeed(folder.path(), &[&words[..], &["--steps", "8192", "--keep", "kept", "--out", "pages"], more].concat())
     };
     let page = study(&[]);
-    assert!(page.contains("--tasks TerrainHopper --grounds flat,adversary"), "{page}");
+    assert!(page.contains("--tasks TerrainHopper --grounds flat,adversary --fresh 16"), "{page}");
     let rows = std::fs::read_to_string(folder.path().join("pages/assault-course.csv")).unwrap();
     let lines: Vec<&str> = rows.lines().skip(1).collect();
     for (line, start) in
         lines.iter().zip(["Hopper,flat,yes", "Hopper,flat,no", "Hopper,adversary,yes", "Hopper,adversary,no"])
     {
-        assert!(line.starts_with(start) && line.matches(" m; ").count() == 6, "{rows}");
+        assert!(line.starts_with(start) && line.matches(" m; ").count() == 8, "{rows}");
     }
     assert_eq!(lines.len(), 4, "{rows}");
     assert!(folder.path().join("kept/TerrainHopper-adversary-heights-1/policy-builder.safetensors").is_file());

@@ -100,8 +100,7 @@ impl Teacher {
             {
                 return (Source::Bank(i), *piece);
             }
-            let (source, most) =
-                if random.uniform(0.0, 1.0) < fresh { (Source::Fresh, 1.0) } else { (Source::Easy, EASY) };
+            let source = if random.uniform(0.0, 1.0) < fresh { Source::Fresh } else { Source::Easy };
             // fresh pieces have sizes of the full range
             let share = if source == Source::Fresh { 1.0 } else { random.uniform(0.0, EASY) };
             (source, Piece::random(self.kinds, share * self.difficulty, &mut random))
