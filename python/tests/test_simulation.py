@@ -1,4 +1,4 @@
-"""What can be read of the bare physics, compared with MuJoCo; and edits of a model."""
+"""Readings of the bare physics, compared with those of MuJoCo, and edits of a model."""
 
 import re
 from pathlib import Path

@@ -29,7 +29,7 @@ const TURN: f64 = 0.5;
 /// How a policy stood up to a player.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Player {
-    /// What the player does.
+    /// Behavior of the player.
     pub name: String,
     /// Agents of the trial.
     pub agents: u64,
