@@ -55,7 +55,7 @@ impl Model {
     /// The settings of the physics as in MJCF's `option`: a new dict.
     #[getter]
     fn option<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        model_edit::option(py, self)
+        model_edit::option(py, &self.inner.opt)
     }
 
     /// Name of the model.

@@ -1,7 +1,6 @@
 //! Edits of a model file before it is compiled, and its solver settings.
 
 use crate::error;
-use crate::model::Model;
 use marathon_physics::hint::among;
 use marathon_physics::mjcf::MjcfError;
 use marathon_physics::model::{Cone, Integrator, Options, Solver};
@@ -124,8 +123,7 @@ fn invalid(e: MjcfError) -> PyErr {
 }
 
 /// The settings of the physics as in MJCF's `option`.
-pub fn option<'py>(py: Python<'py>, model: &Model) -> PyResult<Bound<'py, PyDict>> {
-    let opt: &Options = &model.inner.opt;
+pub fn option<'py>(py: Python<'py>, opt: &Options) -> PyResult<Bound<'py, PyDict>> {
     let out = PyDict::new(py);
     out.set_item("timestep", opt.timestep)?;
     out.set_item(

@@ -94,7 +94,7 @@ pub enum Study {
         #[arg(long)]
         no_adversary: bool,
         /// Fresh random courses of the evaluation; 0 leaves it out.
-        #[arg(long, value_name = "N", default_value_t = crate::assault_course::FRESH)]
+        #[arg(long, value_name = "N", default_value_t = crate::fresh_courses::FRESH)]
         fresh: usize,
     },
 }

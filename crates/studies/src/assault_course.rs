@@ -3,7 +3,7 @@
 
 use crate::args::Options;
 use crate::error::StudyError;
-use crate::fresh_courses::{self, Fresh, Outcome};
+use crate::fresh_courses::{self, FRESH, Fresh, Outcome};
 use crate::kept;
 use crate::record::Record;
 use crate::statistics::{cell, median};
@@ -59,8 +59,6 @@ const COURSES: [(&str, &str, &str); 5] = [
 
 /// Ground that a character's own adversary may build.
 const ADVERSARY: [(&str, &str); 3] = [("course", "adversary"), ("levels", "fixed"), ("difficulty", "0.5")];
-/// Number of fresh random courses, unless the user sets it.
-pub const FRESH: usize = 1000;
 /// Characters against which an adversary can learn.
 const HAVE_ADVERSARIES: [&str; 2] = ["TerrainHopper", "TerrainWalker2d"];
 /// Decisions of the character for which its own adversary learns.

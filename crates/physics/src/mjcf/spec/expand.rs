@@ -5,8 +5,10 @@
 use super::super::compiler::Settings;
 use super::super::document::{Element, MAX_DEPTH};
 use super::super::error::MjcfError;
-use super::attach::{ClassNames, Key, Library};
 use super::kind::{Kind, WORLD};
+use super::library::Library;
+use super::library::classes::ClassNames;
+use super::library::keys::Key;
 use super::references::Gone;
 use super::walk::{self, Path};
 use std::collections::BTreeMap;

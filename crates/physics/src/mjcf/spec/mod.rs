@@ -38,6 +38,7 @@ mod element;
 mod expand;
 mod keyframes;
 mod kind;
+mod library;
 mod model_parts;
 mod obstacles;
 mod part;
@@ -62,9 +63,9 @@ use super::room::Room;
 use super::{assemble, schema};
 use crate::hint::nearest;
 use crate::model::Model;
-use attach::Library;
 use keyframes::Share;
 use kind::WORLD;
+use library::{Library, keys};
 use references::Gone;
 use std::path::{Path as FilePath, PathBuf};
 use walk::Path;
@@ -126,7 +127,7 @@ impl ModelSpec {
         let library = Library::new(resolve, expand::expand, &room);
         let mut root = document::parse(xml, name, "", &|file| super::utf8(resolve(file)?), &room)?;
         let keys = expand::expand(&mut root, "", &library)?;
-        attach::write_keys(&mut root, &keys, &room)?;
+        keys::write(&mut root, &keys, &room)?;
         Ok(ModelSpec { root, folder: None }.with_world())
     }
 

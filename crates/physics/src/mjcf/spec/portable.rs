@@ -13,8 +13,8 @@ use super::super::orientation::euler_product;
 use super::super::room::Room;
 use super::super::schema::OTHER_MASS;
 use super::super::value::Attrs;
-use super::attach::class_names;
 use super::last_section;
+use super::library::classes::class_names;
 use super::part::{Draft, set};
 use std::borrow::Cow;
 

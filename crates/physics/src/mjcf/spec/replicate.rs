@@ -11,8 +11,8 @@ use super::super::math::{add, rotate, scale};
 use super::super::orientation::from_euler;
 use super::super::schema;
 use super::super::value::Attrs;
-use super::attach::forget_keys;
 use super::expand::{Expansion, FOLLOWERS, named};
+use super::library::keys;
 use super::part::{Draft, set};
 use super::references::{self, Gone};
 use super::walk;
@@ -112,7 +112,7 @@ impl Expansion<'_> {
 fn numbered(element: &Element, names: &Gone, suffix: &str, index: usize) -> Element {
     let mut copy = references::numbered(element, names, suffix);
     if index > 0 {
-        forget_keys(&mut copy);
+        keys::forget(&mut copy);
     }
     copy
 }

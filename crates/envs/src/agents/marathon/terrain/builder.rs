@@ -6,7 +6,7 @@
 
 use marathon_physics::lanes::Real;
 
-use super::course::{CELL, FARTHEST, FROM, LEVEL_TO, POINTS};
+use super::profile::{CELL, FARTHEST, FROM, LEVEL_TO, POINTS};
 use super::regret::{REFERENCE, REGRET, SECOND};
 use super::runners::Runner;
 use super::{BUILT, DIFFICULTY, DUE, SINCE, STEP};

@@ -6,21 +6,10 @@
 
 use super::pieces::PieceKind;
 use super::profile::Profile;
+pub use super::profile::{CELL, FARTHEST, FROM, LEVEL_TO, POINTS, TO};
 use crate::agent::options::Choice;
 use crate::episode_rng::EpisodeRng;
 
-/// Distance between the points of a course, m.
-pub const CELL: f64 = 0.1;
-/// Start of a course, m.
-pub const FROM: f64 = -6.0;
-/// End of a course, m.
-pub const TO: f64 = 106.0;
-/// Points of a course.
-pub const POINTS: usize = ((TO - FROM) / CELL) as usize + 1;
-/// End of the level ground around the start, m. The original's first six meters are level.
-pub const LEVEL_TO: f64 = 5.0;
-/// Largest height difference from the start, without gaps and single obstacles, m.
-pub const FARTHEST: f64 = 4.0;
 /// Depth of a gap, m.
 const DEPTH: f64 = 0.6;
 /// Distance between the rows of a field, m.

@@ -45,8 +45,9 @@ use crate::agent::{
 };
 use crate::episode_rng::EpisodeRng;
 use arguments::{Earns, Falls, Levels, Reward};
-use course::{FROM, Kind, POINTS, ROW, TO};
+use course::{Kind, ROW};
 use plan::Teacher;
+use profile::{FROM, POINTS, TO};
 
 /// Points at which the ground is seen, and how far one is from the next and the first behind the figure, m.
 const SEEN: usize = 25;

@@ -10,8 +10,7 @@
 //! | rubble | stones 4 to 20; height* 0 to 0.18 m; length of a stone 0.1 to 0.4 m; level ground after it 0.5 to 1.5 m |
 //! | box | height* 0.05 to 0.55 m; length 0.2 to 2 m; level ground after it 0.8 to 4 m |
 
-use super::course::FARTHEST;
-use super::profile::Profile;
+use super::profile::{FARTHEST, Profile};
 use crate::episode_rng::EpisodeRng;
 
 /// Most numbers of a piece.

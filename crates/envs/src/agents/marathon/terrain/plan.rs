@@ -24,9 +24,8 @@
 use marathon_physics::lanes::Real;
 
 use super::bank::{self, Bank, Record, Rule};
-use super::course::LEVEL_TO;
 use super::pieces::{Piece, PieceKind};
-use super::profile::Profile;
+use super::profile::{LEVEL_TO, Profile};
 use super::{AT, HURT};
 use crate::episode_rng::EpisodeRng;
 

@@ -1,6 +1,17 @@
 //! The height profile of a course under construction.
 
-use super::course::{CELL, FROM, LEVEL_TO, POINTS};
+/// Distance between the points of a course, m.
+pub const CELL: f64 = 0.1;
+/// Start of a course, m.
+pub const FROM: f64 = -6.0;
+/// End of a course, m.
+pub const TO: f64 = 106.0;
+/// Points of a course.
+pub const POINTS: usize = ((TO - FROM) / CELL) as usize + 1;
+/// End of the level ground around the start, m. The original's first six meters are level.
+pub const LEVEL_TO: f64 = 5.0;
+/// Largest height difference from the start, without gaps and single obstacles, m.
+pub const FARTHEST: f64 = 4.0;
 
 /// A height profile that grows along x.
 pub(super) struct Profile {

@@ -11,7 +11,7 @@
 
 use marathon_physics::lanes::Real;
 
-use super::course::LEVEL_TO;
+use super::profile::LEVEL_TO;
 use super::{AT, BUILT, DUE, FARTHEST, HIT, HURT, LIES, MARK, SINCE};
 use crate::agent::Site;
 

@@ -8,17 +8,9 @@
 //! * Its `<option>` counts as `<compiler conflict>` says. By default, the enclosing model's counts.
 //! * Its keyframes become keyframes of the enclosing model, in which all else is at rest.
 
-mod child;
-mod classes;
 mod conflict;
 mod follow;
-mod keys;
-mod library;
 mod prefix;
-
-pub(super) use classes::{ClassNames, class_names};
-pub(super) use keys::{Key, forget as forget_keys, write as write_keys};
-pub(super) use library::Library;
 
 use super::super::document::{Attr, Element};
 use super::super::error::{MjcfError, MjcfErrorKind, shorten};
@@ -26,11 +18,12 @@ use super::super::schema;
 use super::super::settings::entries;
 use super::expand::{Expansion, FOLLOWERS, named};
 use super::kind::{Kind, WORLD};
+use super::library::child::Child;
+use super::library::keys;
 use super::part::{Draft, set};
 use super::references::Gone;
 use super::walk::{self, Path};
 use crate::hint::nearest;
-use child::Child;
 use prefix::Prefix;
 use std::collections::BTreeSet;
 

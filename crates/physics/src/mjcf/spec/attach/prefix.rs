@@ -4,9 +4,9 @@ use super::super::super::asset;
 use super::super::super::defaults::MAIN;
 use super::super::super::document::{Attr, Element};
 use super::super::kind::Kind;
+use super::super::library::classes::Classes;
 use super::super::part::set;
 use super::super::references;
-use super::classes::Classes;
 
 /// Attributes that name an asset.
 const ASSETS: [&str; 4] = ["material", "texture", "hfield", "mesh"];

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 /// New names of a model's classes, by their own ones.
-pub(super) type Classes = BTreeMap<String, String>;
+pub(in super::super) type Classes = BTreeMap<String, String>;
 
 /// Names of all classes of a document, and those that attached models got.
 pub(in super::super) struct ClassNames {
@@ -24,7 +24,7 @@ impl ClassNames {
     }
 
     /// Names for the classes of a model that is attached with a prefix, and whether they are new.
-    pub(super) fn map(&mut self, child: &Child, prefix: &str) -> (Rc<Classes>, bool) {
+    pub(in super::super) fn map(&mut self, child: &Child, prefix: &str) -> (Rc<Classes>, bool) {
         let key = (child.file.clone(), prefix.to_owned());
         if let Some(classes) = self.given.get(&key) {
             return (classes.clone(), false);

@@ -23,14 +23,14 @@ pub(in super::super) struct Key {
 
 impl Key {
     /// The keyframe in a model that attaches this one. Keyframes of models that this one attaches keep their names, as in MuJoCo.
-    pub(super) fn attached(&self, prefix: &str) -> Key {
+    pub(in super::super) fn attached(&self, prefix: &str) -> Key {
         let name = if self.own { format!("{prefix}{}", self.name) } else { self.name.clone() };
         Key { name, own: false, ..self.clone() }
     }
 }
 
 /// Moves the numbers of a model's keyframes to its elements.
-pub(super) fn keep(root: &mut Element, room: &Room) -> Result<Vec<Key>, MjcfError> {
+pub(in super::super) fn keep(root: &mut Element, room: &Room) -> Result<Vec<Key>, MjcfError> {
     let mut keys = Vec::new();
     if entries(root, "keyframe").next().is_none() {
         return Ok(keys);
@@ -65,7 +65,7 @@ pub(super) fn keep(root: &mut Element, room: &Room) -> Result<Vec<Key>, MjcfErro
 
 /// Gives the numbers of the model's own keyframes the names that these have where the model is attached. As in MuJoCo, all elements
 /// keep them until they are copied.
-pub(super) fn store(element: &mut Element, prefix: &str, room: &Room) -> Result<(), MjcfError> {
+pub(in super::super) fn store(element: &mut Element, prefix: &str, room: &Room) -> Result<(), MjcfError> {
     let own: Vec<KeyNumbers> = element.keys.iter().filter(|numbers| numbers.own).cloned().collect();
     for numbers in own {
         let key = format!("{prefix}{}", numbers.key);

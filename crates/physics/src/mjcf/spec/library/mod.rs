@@ -1,15 +1,19 @@
 //! Models that others attach: found by name, read once per file.
 
-use super::super::super::compiler::Settings;
-use super::super::super::document::{self, Attr, Element, join, normalize};
-use super::super::super::error::{MjcfError, MjcfErrorKind, shorten};
-use super::super::super::room::Room;
-use super::super::super::schema;
-use super::super::super::settings::entries;
-use super::super::super::utf8;
-use super::child::Child;
-use super::keys::{self, Key};
+pub(super) mod child;
+pub(super) mod classes;
+pub(super) mod keys;
+
+use super::super::compiler::Settings;
+use super::super::document::{self, Attr, Element, join, normalize};
+use super::super::error::{MjcfError, MjcfErrorKind, shorten};
+use super::super::room::Room;
+use super::super::schema;
+use super::super::settings::entries;
+use super::super::utf8;
 use crate::hint::nearest;
+use child::Child;
+use keys::Key;
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -21,10 +25,10 @@ const MOST_LOOKS: usize = 20_000_000;
 const MAX_NESTED: usize = 20;
 
 /// Expands the copies of a document, given the folder of its file, and returns the keyframes of attached models.
-pub(in super::super) type Expand = fn(&mut Element, &str, &Library) -> Result<Vec<Key>, MjcfError>;
+pub(super) type Expand = fn(&mut Element, &str, &Library) -> Result<Vec<Key>, MjcfError>;
 
 /// All models that a model and its parts attach, and what reading them may cost.
-pub(in super::super) struct Library<'a> {
+pub(super) struct Library<'a> {
     resolve: &'a dyn Fn(&str) -> Result<Vec<u8>, String>,
     expand: Expand,
     pub room: &'a Room,
