@@ -125,7 +125,7 @@ has a folder for each stage. The same command resumes it.";
 #[command(after_help = TRAIN_HELP)]
 pub struct TrainArgs {
     /// Task to train, such as hopper, walker, ant, humanoid or Hopper-v5; see `marathon list`. Or a file with stages, .yaml.
-    #[arg(value_name = "TASK", required_unless_present = "resume")]
+    #[arg(required_unless_present = "resume")]
     pub agent: Option<String>,
     #[command(flatten)]
     pub run: RunOptions,

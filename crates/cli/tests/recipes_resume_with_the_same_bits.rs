@@ -194,8 +194,8 @@ fn options_that_do_not_go_with_stages_are_refused() {
         ("until: fals < 1", "a.yaml: stages.a.until: found 'fals', expected one of steps, return_mean"),
         ("options: {x: 5}", "a.yaml: stages.a.options.x: found 5, expected no option, because Hopper-v0 has none"),
         (
-            "task: AntController, options: {schedul: even}",
-            "stages.a.options.schedul: found even, expected an option of AntController-v0",
+            "task: MarathonManSteer, options: {comands: even}",
+            "stages.a.options.comands: found 'even', expected an option of MarathonManSteer-v0",
         ),
         ("initialize_from: none.safetensors", "none.safetensors"),
         ("config: none.yaml", "none.yaml"),
@@ -215,6 +215,7 @@ fn options_that_do_not_go_with_stages_are_refused() {
     // the stages of a task's recipe
     let list = succeed(path, &["train", "MarathonManController", "--list-stages"]);
     assert!(list.contains(" 9 of 12  skills: distill MarathonManController-v0, waiting"), "{list}");
+    assert!(list.contains("--option commands=sharp --option start=adaptive"), "{list}");
     let json = json(&succeed(path, &["--json", "train", "HopperController", "--list-stages"]));
     assert_eq!(json["stages"].as_array().unwrap().len(), 4);
 }

@@ -157,6 +157,11 @@ impl Recipe {
         }
     }
 
+    /// Whether stages begin with the presets of their tasks.
+    pub fn has_preset(&self) -> bool {
+        self.file.preset
+    }
+
     /// The settings that a stage that trains begins with: those of its configuration file, given by name and bytes, or of the
     /// task's preset.
     ///

@@ -10,7 +10,8 @@ use crate::measure;
 use crate::task_config::{TaskConfig, TaskOptions};
 use crate::text::{path_word, word};
 use marathon_config::recipe::{Recipe, Source, Stage, StageKind};
-use marathon_config::{Loaded, shipped};
+use marathon_config::{Loaded, default_for, default_of, shipped};
+use marathon_envs::options::Value as Argument;
 use marathon_envs::registry;
 use marathon_learn::checksum;
 use marathon_physics::budget;
@@ -41,13 +42,8 @@ pub struct Step {
 
 /// Work of a stage.
 pub enum Job {
-    /// Reinforcement learning.
-    Train {
-        /// Settings of the run.
-        loaded: Box<Loaded>,
-        /// Settings that it begins with.
-        base: Box<Loaded>,
-    },
+    /// Reinforcement learning, with the settings of the run.
+    Train(Box<Loaded>),
     /// Distillation.
     Distill(DistillOptions),
     /// The mean of policies.
@@ -130,7 +126,7 @@ impl Plan {
         let start = |source: &Option<Source>| source.as_ref().map(|source| self.name_of(source));
         let mut about = json!({ "kind": stage.kind.name(), "task": step.task.agent, "seeds": step.seeds });
         match (&stage.kind, &step.job) {
-            (StageKind::Train { initialize_from, .. }, Job::Train { loaded, .. }) => {
+            (StageKind::Train { initialize_from, .. }, Job::Train(loaded)) => {
                 let mut loaded = (**loaded).clone();
                 inputs::name_wholly(&mut loaded.config);
                 for (path, sum) in inputs::of(&step.task, &loaded.config)? {
@@ -156,7 +152,7 @@ impl Plan {
             (StageKind::Average { policies }, _) => about["average"] = json!(names(policies)),
             _ => {}
         }
-        if !matches!(step.job, Job::Train { .. }) {
+        if !matches!(step.job, Job::Train(_)) {
             let options = stage.options.iter().map(|(name, value)| (name.clone(), value.to_string().into()));
             about["options"] = Value::Object(options.collect());
         }
@@ -198,11 +194,22 @@ impl Plan {
         let options = |options: &mut dyn Iterator<Item = (&String, String)>| {
             options.map(|(name, value)| format!(" --option {}", word(&format!("{name}={value}")))).collect::<String>()
         };
-        let given = options(&mut stage.options.iter().map(|(name, value)| (name, value.to_string())));
+        let plain = |value: &Argument| match value {
+            Argument::Text(text) => text.clone(),
+            value => value.to_string(),
+        };
+        let given = options(&mut stage.options.iter().map(|(name, value)| (name, plain(value))));
         let out = path_word(&step.folder.join(state::POLICY));
         match (&stage.kind, &step.job) {
-            (StageKind::Train { config, initialize_from }, Job::Train { loaded, base }) => {
-                let mut own = loaded.differences_from(base);
+            (StageKind::Train { initialize_from, .. }, Job::Train(loaded)) => {
+                // a configuration may be one that is no file, so its settings are named
+                let (preset, name) = (default_for(&stage.task), loaded.config.algorithm.name());
+                let has_preset = self.recipe.has_preset() && preset.config.algorithm.name() == name;
+                let (base, algorithm) = match has_preset {
+                    true => (preset, String::new()),
+                    false => (default_of(name), format!(" --algo {name}")),
+                };
+                let mut own = loaded.differences_from(&base);
                 let of_task = own.remove("options").unwrap_or_default();
                 let of_task = of_task.as_object().cloned().unwrap_or_default();
                 let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), String::from);
@@ -212,11 +219,11 @@ impl Plan {
                     "run.seed" | "run.threads" => {}
                     _ => settings += &format!(" --set {}", word(&format!("{key}={value}"))),
                 });
-                let config = config.iter().map(|name| format!(" --config {}", word(name))).collect::<String>();
                 let command =
-                    format!("marathon train {}{config}{}{given}{settings}", stage.task, start(initialize_from));
+                    format!("marathon train {}{algorithm}{}{given}{settings}", stage.task, start(initialize_from));
+                let until = stage.until.iter().map(|until| format!("  # until {until}")).collect::<String>();
                 let of_seed = |seed: &u64| {
-                    format!("{command} --seed {seed} --out {}", path_word(&self.run_folder(i, Some(*seed))))
+                    format!("{command} --seed {seed} --out {}{until}", path_word(&self.run_folder(i, Some(*seed))))
                 };
                 step.seeds.iter().map(of_seed).collect()
             }
@@ -250,7 +257,7 @@ fn step(recipe: &Recipe, stage: &Stage, folder: PathBuf, seed: u64, threads: Opt
         StageKind::Train { config, .. } => {
             let file = config.as_ref().map(|name| read_config(recipe, name)).transpose()?;
             let base = recipe.base(stage, file.as_ref().map(|(path, bytes)| (path.as_path(), &bytes[..])))?;
-            let mut loaded = recipe.settings(stage, base.clone())?;
+            let mut loaded = recipe.settings(stage, base)?;
             let run = &mut loaded.config.run;
             run.threads = threads.unwrap_or(run.threads);
             if seeds.is_empty() {
@@ -266,7 +273,7 @@ fn step(recipe: &Recipe, stage: &Stage, folder: PathBuf, seed: u64, threads: Opt
                 ));
             }
             let given = loaded.options.clone();
-            (Job::Train { loaded: Box::new(loaded), base: Box::new(base) }, given)
+            (Job::Train(Box::new(loaded)), given)
         }
         StageKind::Distill { hidden, agents, lr, .. } => {
             let usual = DistillOptions::default();

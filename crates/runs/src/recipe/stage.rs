@@ -60,7 +60,7 @@ impl<'a> Work<'a> {
         let (stage, step) = self.stage();
         let folder = &step.folder;
         fs::create_dir_all(folder).map_err(RunError::io(folder, "create folder"))?;
-        let alone = matches!(step.job, Job::Train { .. }) && step.seeds.len() == 1;
+        let alone = matches!(step.job, Job::Train(_)) && step.seeds.len() == 1;
         // the folder of a single run is new or empty until the run begins
         if !alone && !self.begun {
             self.about.write(folder)?;
@@ -73,7 +73,7 @@ impl<'a> Work<'a> {
             let folder = self.plan.run_folder(self.index, Some(*seed));
             state::refuse_link(&folder)?;
             let one = match &step.job {
-                Job::Train { loaded, .. } => self.train(loaded, *seed, &folder, alone, front)?,
+                Job::Train(loaded) => self.train(loaded, *seed, &folder, alone, front)?,
                 Job::Distill(options) => self.distill(options, *seed, &folder, front)?,
                 Job::Average => None,
             };
@@ -266,7 +266,7 @@ impl<'a> Work<'a> {
     fn measured(&self, pick: &Pick) -> Result<BTreeMap<u64, Option<f64>>, RunError> {
         let (_, step) = self.stage();
         let threads = match &step.job {
-            Job::Train { loaded, .. } => loaded.config.run.threads,
+            Job::Train(loaded) => loaded.config.run.threads,
             Job::Distill(options) => options.threads,
             Job::Average => 1,
         };
