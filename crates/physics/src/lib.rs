@@ -68,11 +68,11 @@ mod batch;
 pub use algebra::spatial;
 pub use algebra::spatial::rot_to_quat;
 pub use batch::workload;
-pub use batch::{Batch, BatchOptions, Blowup, BodyReading, ContactReading, Quantity, Replay, Snapshot};
+pub use batch::{Batch, BatchOptions, Blowup, BodyReading, Quantity, Replay, Snapshot};
 pub use lanes::{Isa, Real};
 pub use mjcf::spec;
 pub use model::Model;
-pub use readings::{MeasurePlan, Readings};
+pub use readings::{ContactReading, MeasurePlan, Readings};
 pub use sim::{Sim, SimError, SimOptions};
 pub use state::{AgentState, Group, Obstacle, ObstacleShape, SolverStats, Variation, Work};
 #[doc(hidden)]

@@ -2,9 +2,9 @@
 
 use super::pool::Helpers;
 use super::quantity::{Felt, Quantity};
-use super::{BodyReading, ContactReading};
+use super::BodyReading;
 use crate::lanes::Real;
-use crate::readings::Readings;
+use crate::readings::{ContactReading, Readings};
 use crate::sim::Sim;
 use crate::state::{AgentState, Group, Obstacle, SolverStats, Variation, Work};
 use std::collections::VecDeque;

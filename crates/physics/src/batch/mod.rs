@@ -16,6 +16,7 @@ pub use quantity::Quantity;
 
 use crate::lanes::Isa;
 use crate::model::Model;
+use crate::readings::ContactReading;
 use crate::sim::{Sim, SimError, SimOptions};
 use crate::state::{AgentState, Obstacle, SolverStats, Variation};
 use crate::with_lanes;
@@ -292,21 +293,6 @@ impl Batch {
     pub fn stats(&self) -> SolverStats {
         self.inner.stats()
     }
-}
-
-/// A contact in world axes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContactReading {
-    /// Geoms, in the order of the model.
-    pub geoms: [usize; 2],
-    /// Place of the contact, m.
-    pub pos: [f64; 3],
-    /// Direction from the first geom to the second.
-    pub normal: [f64; 3],
-    /// Force on the second geom, N.
-    pub force: [f64; 3],
-    /// Torque on it about the contact, N m: from contacts that resist twisting or rolling.
-    pub torque: [f64; 3],
 }
 
 /// Pose and motion of a body in world axes.

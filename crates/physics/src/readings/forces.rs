@@ -2,12 +2,26 @@
 
 use super::Readings;
 use crate::algebra::spatial::*;
-use crate::batch::ContactReading;
 use crate::lanes::Real;
 use crate::model::EqualityKind;
 use crate::rows::FloorRow;
 use crate::rows::{Block, Jacobian, Source};
 use crate::sim::Mount;
+
+/// A contact in world axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactReading {
+    /// Geoms, in the order of the model.
+    pub geoms: [usize; 2],
+    /// Place of the contact, m.
+    pub pos: [f64; 3],
+    /// Direction from the first geom to the second.
+    pub normal: [f64; 3],
+    /// Force on the second geom, N.
+    pub force: [f64; 3],
+    /// Torque on it about the contact, N m: from contacts that resist twisting or rolling.
+    pub torque: [f64; 3],
+}
 
 /// A contact in some lanes.
 pub(super) struct ContactForce<T: Real> {

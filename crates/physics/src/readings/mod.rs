@@ -18,6 +18,7 @@ mod sensors;
 mod strings;
 mod touch;
 
+pub use forces::ContactReading;
 pub use measure::MeasurePlan;
 
 use crate::algebra::spatial::*;
