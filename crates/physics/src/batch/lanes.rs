@@ -1,8 +1,8 @@
 //! The agents of a batch in lanes of one width.
 
+use super::BodyReading;
 use super::pool::Helpers;
 use super::quantity::{Felt, Quantity};
-use super::BodyReading;
 use crate::lanes::Real;
 use crate::readings::{ContactReading, Readings};
 use crate::sim::Sim;
