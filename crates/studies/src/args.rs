@@ -72,8 +72,20 @@ pub enum Study {
         #[arg(long)]
         kept_only: bool,
     },
-    /// Characters that learned on ground of ten kinds, with and without seeing it, on courses that are new to all of them. Runs are kept in runs/assault-course or --keep, each with a small
-    /// file of its results; these files are enough to write the page again.
+    /// Policies on fresh random courses, and on the tenth of these that is worst for each.
+    FreshCourses {
+        #[command(flatten)]
+        options: Options,
+        /// Policy files of tasks on courses.
+        #[arg(value_name = "POLICY", required = true)]
+        policies: Vec<PathBuf>,
+        /// Number of courses.
+        #[arg(long, value_name = "N", default_value_t = crate::assault_course::FRESH)]
+        fresh: usize,
+    },
+    /// Characters that learned on ground of ten kinds, with and without seeing it, on courses that are new to all of them.
+    /// Runs are kept in runs/assault-course or --keep, each with a small file of its results; these files are enough to
+    /// write the page again.
     AssaultCourse {
         #[command(flatten)]
         options: Options,
@@ -105,6 +117,7 @@ impl Study {
         match self {
             Study::Table1 { options, .. } | Study::Table3 { options, .. } => options,
             Study::StyleTransfer { options, .. } | Study::AssaultCourse { options, .. } => options,
+            Study::FreshCourses { options, .. } => options,
             Study::Table2(options) | Study::MlagentsAgreement(options) | Study::Concurrency(options) => options,
             Study::DecisionPeriod(options) | Study::Headless(options) | Study::MultiEnv(options) => options,
         }

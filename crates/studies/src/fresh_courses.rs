@@ -4,13 +4,17 @@
 //! A first set of rollouts finds the worst courses, and a second one measures the runner on them. Courses that were only
 //! run badly by chance therefore do not count as the worst ones.
 
+use crate::args::Options;
 use crate::error::StudyError;
+use crate::record::Record;
 use marathon_envs::options::Value;
 use marathon_envs::{Autoreset, VecEnv, VecEnvOptions};
 use marathon_learn::{BlockPolicy, Policy};
 use marathon_physics::lanes::Isa;
-use marathon_runs::TaskConfig;
+use marathon_runs::report::chart::Chart;
+use marathon_runs::{PolicySource, TaskConfig, TaskOptions};
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 
 /// Number of fresh random courses, unless the user sets it.
 pub const FRESH: usize = 1000;
@@ -45,6 +49,40 @@ pub struct Outcome {
     pub distance: f64,
     /// Share of the rollouts that lasted until the time limit or the end of the course, without a fall.
     pub finished: f64,
+}
+
+/// Measures policies of files.
+///
+/// # Errors
+/// If a policy cannot be read, or is not for a task on courses.
+pub fn run(options: &Options, policies: &[PathBuf], courses: usize) -> Result<Record, StudyError> {
+    let (mut rows, mut bars, mut words) = (Vec::new(), Vec::new(), String::new());
+    for path in policies {
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let source = PolicySource { policy: path.clone(), agent: None, task: TaskOptions::default() };
+        let policy = source.load()?.0;
+        let task = TaskConfig { agent: policy.meta().agent.clone(), options: policy.meta().options.clone() };
+        let Fresh { all, worst, .. } = measure(&policy, &task, courses, options.threads)?;
+        let cells = [all, worst].map(|o| [format!("{:.1}", o.distance), format!("{:.1}", 100.0 * o.finished)]);
+        rows.push([vec![name.clone(), courses.to_string()], cells.concat()].concat());
+        bars.push((name, worst.distance));
+        words.push_str(&format!(" {}", path.display()));
+    }
+    Ok(Record {
+        name: "fresh-courses",
+        title: "Fresh courses",
+        about: format!(
+            "Policies run over random mixed courses of full difficulty, the same for all of them, each {} times. The first half \
+             of the runs finds the worst tenth of the courses for a policy, the other half measures the policy on all courses and \
+             on these. A run is finished if it lasted to the time limit, or to the end of the course, without a fall.",
+            2 * ROLLOUTS
+        ),
+        columns: vec!["policy", "courses", "way, m", "finished, %", "worst tenth: way, m", "worst tenth: finished, %"],
+        rows,
+        words: format!("{words} --fresh {courses}"),
+        versions: Vec::new(),
+        chart: Chart::Bars("mean way on the worst tenth of the courses, m", bars),
+    })
 }
 
 /// Runs a policy on fresh mixed courses of difficulty 1. `task` has its other options.

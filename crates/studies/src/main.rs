@@ -66,6 +66,7 @@ fn run(args: &Args) -> Result<(), StudyError> {
         Study::Headless(_) => headless::run(options),
         Study::MultiEnv(_) => multi_env::run(options),
         Study::StyleTransfer { clips, kept_only, .. } => style_transfer::run(options, clips, *kept_only),
+        Study::FreshCourses { policies, fresh, .. } => fresh_courses::run(options, policies, (*fresh).max(1)),
         Study::AssaultCourse { tasks, grounds, sights, kept_only, no_adversary, fresh, .. } => {
             let evaluations =
                 assault_course::Evaluations { kept_only: *kept_only, adversary: !no_adversary, fresh: *fresh };

@@ -22,6 +22,7 @@ mod arguments;
 mod bank;
 mod builder;
 pub mod course;
+mod distance;
 mod pieces;
 mod plan;
 mod profile;
@@ -84,10 +85,6 @@ const BUILT: usize = 10;
 const STEP: usize = 11;
 const MEMORY: usize = 12;
 
-/// Way that makes the next course harder, and way that makes it easier, m, and by how much.
-const FAR: f64 = 16.0;
-const NEAR: f64 = 8.0;
-const RUNG: f64 = 0.05;
 /// Time without a new meter that ends an episode, s.
 const PATIENCE: f64 = 5.0;
 /// Falls before here end the episode even of a figure that may fall, m.
@@ -200,17 +197,6 @@ impl<F: Runner> Terrain<F> {
             Falls::End => lies,
             Falls::Hurt => T::and(lies, memory[AT].lt(T::lit(TOO_EARLY))),
         }
-    }
-
-    /// Level of the next course after an episode that has left its memory; 0 for the first one.
-    fn next_level(previous: &[f64]) -> f64 {
-        let previous = &previous[F::MEMORY..];
-        let change = match regret::way_of_runner(previous).unwrap_or(previous[FARTHEST]) {
-            far if far >= FAR => RUNG,
-            near if near < NEAR => -RUNG,
-            _ => 0.0,
-        };
-        (previous[LEVEL] + change).clamp(0.0, 1.0)
     }
 
     /// Sets the figure's own variables as at the start of an episode in some lanes.
@@ -330,7 +316,7 @@ impl<F: Runner> Agent for Terrain<F> {
         let course = self.arguments.course();
         let level = match levels {
             Levels::Random => start.random.uniform(0.0, 1.0),
-            Levels::Distance => Self::next_level(start.previous),
+            Levels::Distance => distance::next_level(&start.previous[F::MEMORY..]),
             _ => 1.0,
         };
         let difficulty = level * most;

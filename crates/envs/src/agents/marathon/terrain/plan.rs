@@ -15,7 +15,7 @@
 //!
 //! Until the bank is full, pieces from it are rarer: at most the share of its records that are in use.
 //!
-//! A course ends with one outcome at most. The piece in which the torso was 0.25 s before a fall has failed, or the one
+//! An episode has one failed piece at most. The piece in which the torso was 0.25 s before a fall has failed, or the one
 //! half a meter ahead of a figure that makes no new meter. The pieces before it are passed. If the time is up, or the
 //! course is left, the last piece has no outcome.
 //!
@@ -151,7 +151,8 @@ impl Teacher {
             replayed.retain(|i| bank.can_have_a_child(*i));
             for _ in 0..CHILDREN.min(replayed.len()) {
                 let parent = replayed.swap_remove(random.whole(0, replayed.len() - 1));
-                if let Some(record) = bank.get(parent) {
+                // another child may have taken its place
+                if let Some(record) = bank.get(parent).filter(|_| bank.can_have_a_child(parent)) {
                     let child = record.piece.edited(bank.pass_rate(record), self.difficulty, random);
                     bank.admit(Record::new(child), self.rule, Some(parent));
                 }
