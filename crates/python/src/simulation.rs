@@ -352,15 +352,13 @@ impl Simulation {
         let out = PyDict::new(py);
         let geoms = all.iter().flat_map(|contact| contact.geoms.map(|geom| geom as i64));
         out.set_item("geom", PyArray1::from_iter(py, geoms).reshape([all.len(), 2])?)?;
-        let fields: [(&str, fn(&ContactReading) -> [f64; 3]); 4] = [
-            ("pos", |contact| contact.pos),
-            ("normal", |contact| contact.normal),
-            ("force", |contact| contact.force),
-            ("torque", |contact| contact.torque),
-        ];
-        for (name, of) in fields {
-            out.set_item(name, PyArray1::from_iter(py, all.iter().flat_map(of)).reshape([all.len(), 3])?)?;
-        }
+        let rows = |of: fn(&ContactReading) -> [f64; 3]| {
+            PyArray1::from_iter(py, all.iter().flat_map(of)).reshape([all.len(), 3])
+        };
+        out.set_item("pos", rows(|contact| contact.pos)?)?;
+        out.set_item("normal", rows(|contact| contact.normal)?)?;
+        out.set_item("force", rows(|contact| contact.force)?)?;
+        out.set_item("torque", rows(|contact| contact.torque)?)?;
         Ok(out)
     }
 

@@ -6,6 +6,9 @@ use marathon_learn::AtomicFile;
 use marathon_runs::text::path_word;
 use std::path::{Path, PathBuf};
 
+/// Number of fresh random courses, unless the user sets it.
+pub const FRESH: usize = 1000;
+
 /// The experiments of Marathon's paper and its own studies: a table, a picture and a page each.
 #[derive(Debug, Parser)]
 #[command(name = "marathon-studies", version, about, arg_required_else_help = true)]
@@ -80,7 +83,7 @@ pub enum Study {
         #[arg(value_name = "POLICY", required = true)]
         policies: Vec<PathBuf>,
         /// Number of courses.
-        #[arg(long, value_name = "N", default_value_t = crate::assault_course::FRESH)]
+        #[arg(long, value_name = "N", default_value_t = FRESH)]
         fresh: usize,
     },
     /// Characters that learned on ground of ten kinds, with and without seeing it, on courses that are new to all of them.
@@ -106,7 +109,7 @@ pub enum Study {
         #[arg(long)]
         no_adversary: bool,
         /// Fresh random courses of the evaluation; 0 leaves it out.
-        #[arg(long, value_name = "N", default_value_t = crate::fresh_courses::FRESH)]
+        #[arg(long, value_name = "N", default_value_t = FRESH)]
         fresh: usize,
     },
 }

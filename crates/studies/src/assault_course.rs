@@ -1,9 +1,9 @@
 //! Assault courses: characters learn on ground that is level, random, increasingly difficult, made of pieces that teach,
 //! or built by an adversary, with and without seeing it. Their policies are evaluated on courses that are new to all of them.
 
-use crate::args::Options;
+use crate::args::{FRESH, Options};
 use crate::error::StudyError;
-use crate::fresh_courses::{self, FRESH, Fresh, Outcome};
+use crate::fresh_courses::{self, Fresh, Outcome};
 use crate::kept;
 use crate::record::Record;
 use crate::statistics::{cell, median};

@@ -16,8 +16,6 @@ use marathon_runs::{PolicySource, TaskConfig, TaskOptions};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Number of fresh random courses, unless the user sets it.
-pub const FRESH: usize = 1000;
 /// Seed of the courses, and of the first rollout. No training has it.
 const SEED: u64 = 1_000_033;
 /// Rollouts on each course in each of the two sets.
