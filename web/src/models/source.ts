@@ -38,12 +38,12 @@ export async function openFiles(marathon: Marathon, files: readonly GivenFile[])
   return open(marathon, text(main.bytes), baseName(main.path), find);
 }
 
-/** The model that no other one includes; among several, a scene, or the first. */
+/** The model that no other one includes or attaches; among several, a scene, or the first. */
 function mainModel(files: readonly GivenFile[]): GivenFile | undefined {
   const models = files.filter(({ path }) => /^(xml|mjcf)$/.test(extension(path)));
   if (models.length < 2) return models[0];
   const included = new Set(
-    models.flatMap(({ bytes }) => [...text(bytes).matchAll(/<include\s+file\s*=\s*["']([^"']+)["']/g)].map(([, file = ""]) => baseName(file))),
+    models.flatMap(({ bytes }) => [...text(bytes).matchAll(/<(?:include|model)\s[^>]*?file\s*=\s*["']([^"']+)["']/g)].map(([, file = ""]) => baseName(file))),
   );
   const tops = models.filter(({ path }) => !included.has(baseName(path)));
   return tops.find(({ path }) => baseName(path).startsWith("scene")) ?? tops[0] ?? models[0];
