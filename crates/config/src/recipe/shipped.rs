@@ -29,7 +29,7 @@ const CONFIGS: [(&str, &str); 4] = [
 ];
 
 static READ: LazyLock<Vec<Recipe>> = LazyLock::new(|| {
-    let read = |(name, text): (&str, &str)| Recipe::parse(Path::new(name), text.as_bytes());
+    let read = |(name, text): (&str, &str)| Recipe::parse_text(Path::new(name), text);
     RECIPES.into_iter().map(|file| read(file).expect("the program's own recipes are right")).collect()
 });
 

@@ -125,8 +125,19 @@ impl Recipe {
     /// If the file has no stages, or a key or value that is not allowed. Messages name file, line and key, what was found and
     /// what was expected.
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, ConfigError> {
-        let map = document::parse(path, bytes)?;
-        let root = Section::root(path, &map);
+        Self::of(path, bytes, &document::parse(path, bytes)?)
+    }
+
+    /// The same for a text of the program itself, which has no limit.
+    ///
+    /// # Errors
+    /// As [`Recipe::parse`].
+    pub(super) fn parse_text(path: &Path, text: &str) -> Result<Self, ConfigError> {
+        Self::of(path, text.as_bytes(), &document::parse_text(path, text)?)
+    }
+
+    fn of(path: &Path, bytes: &[u8], map: &document::Map) -> Result<Self, ConfigError> {
+        let root = Section::root(path, map);
         let Some(entry) = root.set(STAGES) else {
             let problem = format!(
                 "found no '{STAGES}', expected a file with stages; `marathon train TASK --config {}` reads a configuration",
@@ -138,7 +149,7 @@ impl Recipe {
             return Err(ConfigError::value(Place { key: TASK.into(), ..entry.place }, "nothing", "the name of a task"));
         };
         let task = known_task(&task)?;
-        let file = File::read(path, &map)?;
+        let file = File::read(path, map)?;
         file.check_tasks(&task)?;
         let section = root.section(STAGES)?;
         let mut stages = Vec::new();
