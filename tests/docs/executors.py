@@ -91,10 +91,12 @@ def task_of(block: Block) -> str:
 
 
 def configuration(block: Block, folder: Path, environment: dict[str, str], limit: float) -> str | None:
-    """Have the program read a block as a configuration."""
+    """Have the program read a block as a configuration, or as a recipe if it has stages."""
     file = folder.parent / "block.yaml"
     file.write_text(block.code)
     words = ["marathon", "config", "show", task_of(block), "--config", str(file)]
+    if any(line.startswith("stages:") for line in block.code.splitlines()):
+        words = ["marathon", "train", str(file), "--list-stages"]
     return command(words, folder, environment, limit)
 
 
