@@ -255,7 +255,7 @@ impl Stage {
         let source = |key: &str| own.set(key).map(|entry| Source::read(&entry, &known, false)).transpose();
         let sources = |key: &str, kept: bool| {
             let Some(entry) = own.get(key) else { return Ok(Vec::new()) };
-            let items = listed(&entry, "stages or files", 1)?;
+            let items = listed(&entry, "stages or files")?;
             items.iter().map(|item| Source::read(item, &known, kept)).collect()
         };
         stage.kind = match of_kind {
@@ -284,7 +284,7 @@ impl Stage {
             if seed.is_some() {
                 return Err(ConfigError::value(entry.place, "'seed' and 'seeds'", "one of them"));
             }
-            for item in listed(&entry, "whole numbers such as [1, 2, 3]", 1)? {
+            for item in listed(&entry, "whole numbers such as [1, 2, 3]")? {
                 let seed = item.count(0..=MOST_STEPS)?;
                 if self.seeds.contains(&seed) {
                     return Err(ConfigError::value(item.place, format!("{seed} twice"), "each seed once"));
@@ -351,11 +351,11 @@ fn worded<T>(entry: &Entry<'_>, read: impl Fn(&str) -> Option<T>, expected: &str
 }
 
 /// The entries of a list of bounded length.
-fn listed<'a>(entry: &Entry<'a>, what: &str, least: usize) -> Result<Vec<Entry<'a>>, ConfigError> {
+fn listed<'a>(entry: &Entry<'a>, what: &str) -> Result<Vec<Entry<'a>>, ConfigError> {
     let expected = format!("a list of {what}");
     let items = entry.items(&expected)?;
     match items.len() {
-        n if n < least => Err(ConfigError::value(entry.place.clone(), "an empty list", expected)),
+        0 => Err(ConfigError::value(entry.place.clone(), "an empty list", expected)),
         n if n > keys::MOST_LISTED => {
             let found = format!("{n} entries");
             Err(ConfigError::value(entry.place.clone(), found, format!("at most {}", keys::MOST_LISTED)))

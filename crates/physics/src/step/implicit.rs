@@ -6,14 +6,14 @@
 //!
 //! `dF/dv = I ((V- + V+) x s) + (V x* I + (I V) x* - I V x) s`.
 //!
-//! Both matrices are sums over the links that a link carries, like composite inertias, and the medium adds its own
-//! derivative to the second. (The same terms in another order: Singh, Russo and Wensing, "Efficient Analytical
+//! Both matrices are sums over the links that a link carries, like composite inertias. The medium adds its own derivative
+//! to the second. (The same terms in another order: Singh, Russo and Wensing, "Efficient Analytical
 //! Derivatives of Rigid-Body Dynamics using Spatial Vector Algebra", 2022.)
 //!
 //! The matrix has entries between degrees of freedom of which one carries the other. Elimination from the leaves to the
 //! roots adds no others. The matrix is that of the masses but for a step's changes, so it needs no pivoting.
 
-use super::implicit_tendons::{add_product, mass_matrix};
+use super::implicit_tendons::{add_couplings, mass_matrix, right_hand_side};
 use crate::algebra::spatial::*;
 use crate::dynamics::add_fluid_derivatives;
 use crate::lanes::{Real, kernel_fn};
@@ -142,44 +142,8 @@ fn damping_matrix<T: Real>(sim: &Sim<T>, work: &mut Work<T>, matrix: &TreeMatrix
     for (start, x) in matrix.start.iter().zip(&forces.minus_qderiv) {
         c.damping[*start] += *x;
     }
-    for t in &matrix.tendons {
-        let tendon = &sim.tendons[*t];
-        for sums in [&mut c.damping, &mut c.full.damping] {
-            let arms = || tendon.arms(&forces.tendon_moments);
-            add_product(matrix, &mut c.arms, sums, forces.minus_tendon_deriv[*t], arms);
-        }
-    }
-    for d in &matrix.drives {
-        for sums in [&mut c.damping, &mut c.full.damping] {
-            add_product(matrix, &mut c.arms, sums, forces.minus_drive_deriv[*d], || forces.drives.arms(sim, *d));
-        }
-    }
-    for row in &matrix.dropped {
-        c.damping[row.clone()].fill(T::zero());
-        c.full.damping[row.clone()].fill(T::zero());
-    }
-}
-
-/// `r - dt B a`, into `change`.
-#[inline(always)]
-fn right_hand_side<T: Real>(sim: &Sim<T>, work: &mut Work<T>, matrix: &TreeMatrix) {
-    let dt = T::splat(sim.dt);
-    let Work { solver, implicit: c, .. } = work;
-    c.change.fill(T::zero());
-    for d in 0..sim.model.nv {
-        let (mut at, mut next) = (matrix.start[d] + 1, matrix.parent[d]);
-        let mut sum = c.damping[matrix.start[d]] * solver.qacc[d];
-        while let Some(i) = next {
-            sum = c.damping[at].mul_add(solver.qacc[i], sum);
-            c.change[i] = (c.full.damping[at] * solver.qacc[d]).neg_mul_add(dt, c.change[i]);
-            (at, next) = (at + 1, matrix.parent[i]);
-        }
-        c.change[d] = sum.neg_mul_add(dt, c.change[d]);
-    }
-    if sim.capped.is_some() {
-        for (x, gradient) in c.change.iter_mut().zip(&solver.capped.gradient) {
-            *x -= *gradient;
-        }
+    for sums in [&mut c.damping, &mut c.full.damping] {
+        add_couplings(sim, forces, matrix, &mut c.arms, sums);
     }
 }
 

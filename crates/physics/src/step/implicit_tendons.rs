@@ -12,7 +12,7 @@
 use crate::algebra::spatial::*;
 use crate::lanes::{Real, kernel_fn};
 use crate::sim::{Sim, TreeMatrix};
-use crate::state::Work;
+use crate::state::{Forces, Work};
 
 kernel_fn! {
     /// Solves for the acceleration with all damping at the end of the step, into `solution`.
@@ -78,23 +78,34 @@ fn damping_matrix<T: Real>(sim: &Sim<T>, work: &mut Work<T>, matrix: &TreeMatrix
     for (start, x) in matrix.start.iter().zip(&forces.minus_qderiv) {
         c.damping[*start] = *x;
     }
+    add_couplings(sim, forces, matrix, &mut c.arms, &mut c.damping);
+}
+
+/// Adds the entries of tendons and drives to one side of the matrix. Rows of simple bodies have no entries.
+#[inline(always)]
+pub(super) fn add_couplings<T: Real>(
+    sim: &Sim<T>,
+    forces: &Forces<T>,
+    matrix: &TreeMatrix,
+    by_dof: &mut [T],
+    sums: &mut [T],
+) {
     for t in &matrix.tendons {
-        let tendon = &sim.tendons[*t];
-        let arms = || tendon.arms(&forces.tendon_moments);
-        add_product(matrix, &mut c.arms, &mut c.damping, forces.minus_tendon_deriv[*t], arms);
+        let arms = || sim.tendons[*t].arms(&forces.tendon_moments);
+        add_product(matrix, by_dof, sums, forces.minus_tendon_deriv[*t], arms);
     }
     for d in &matrix.drives {
         let arms = || forces.drives.arms(sim, *d);
-        add_product(matrix, &mut c.arms, &mut c.damping, forces.minus_drive_deriv[*d], arms);
+        add_product(matrix, by_dof, sums, forces.minus_drive_deriv[*d], arms);
     }
     for row in &matrix.dropped {
-        c.damping[row.clone()].fill(T::zero());
+        sums[row.clone()].fill(T::zero());
     }
 }
 
 /// Adds `J' b J` to a matrix, for the moment arms `J`.
 #[inline(always)]
-pub(super) fn add_product<T: Real, I: Iterator<Item = (usize, T)>>(
+fn add_product<T: Real, I: Iterator<Item = (usize, T)>>(
     matrix: &TreeMatrix,
     by_dof: &mut [T],
     sums: &mut [T],
@@ -117,17 +128,18 @@ pub(super) fn add_product<T: Real, I: Iterator<Item = (usize, T)>>(
 
 /// `r - dt B a`, into `change`.
 #[inline(always)]
-fn right_hand_side<T: Real>(sim: &Sim<T>, work: &mut Work<T>, matrix: &TreeMatrix) {
+pub(super) fn right_hand_side<T: Real>(sim: &Sim<T>, work: &mut Work<T>, matrix: &TreeMatrix) {
     let dt = T::splat(sim.dt);
     let Work { solver, implicit: c, .. } = work;
+    // the entries above the diagonal
+    let upper = if matrix.full { &c.full.damping } else { &c.damping };
     c.change.fill(T::zero());
     for d in 0..sim.model.nv {
         let (mut at, mut next) = (matrix.start[d] + 1, matrix.parent[d]);
         let mut sum = c.damping[matrix.start[d]] * solver.qacc[d];
         while let Some(i) = next {
-            let x = c.damping[at];
-            sum = x.mul_add(solver.qacc[i], sum);
-            c.change[i] = (x * solver.qacc[d]).neg_mul_add(dt, c.change[i]);
+            sum = c.damping[at].mul_add(solver.qacc[i], sum);
+            c.change[i] = (upper[at] * solver.qacc[d]).neg_mul_add(dt, c.change[i]);
             (at, next) = (at + 1, matrix.parent[i]);
         }
         c.change[d] = sum.neg_mul_add(dt, c.change[d]);

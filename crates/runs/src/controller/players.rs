@@ -13,7 +13,7 @@ const PLAYED: f64 = 30.0;
 /// Mean time for which a key is held or not, s.
 const KEY: f64 = 0.85;
 /// Probability that a key is pressed, per button.
-const PRESSED: f64 = 0.2;
+const BUTTON: f64 = 0.2;
 /// Time between changes of side, s.
 const SIDES: f64 = 1.5;
 /// Half a period of a trembling stick, s: 5 Hz.
@@ -21,7 +21,7 @@ const TREMBLE: f64 = 0.1;
 /// A short jump, s: time of standing before, of the button, of standing after it, and of the command to go.
 const JUMP: [f64; 4] = [2.0, 0.4, 0.2, 3.0];
 /// Time of standing before a push, s.
-const STANDING: f64 = 2.0;
+const UPRIGHT: f64 = 2.0;
 /// Commands to a character that gets up: their number, and the time of each, s.
 const TURNS: usize = 16;
 const TURN: f64 = 0.5;
@@ -69,7 +69,7 @@ impl Keyboard {
             }
             let luck = self.dice.uniform();
             *value = match range.is_button() {
-                true if luck < PRESSED => 1.0,
+                true if luck < BUTTON => 1.0,
                 true => 0.0,
                 false => [range.low, range.rest(), range.high][(luck * 3.0) as usize],
             };
@@ -106,8 +106,9 @@ pub(super) fn all<'a>(
             })?);
         }
     }
-    let mut keyboards: Vec<Keyboard> = (0..trial()?.agents()).map(|agent| Keyboard::new(agent, ranges)).collect();
-    out.push(play(trial()?, "keyboard", |agent, time| keyboards[agent].at(time, ranges))?);
+    let typing = trial()?;
+    let mut keyboards: Vec<Keyboard> = (0..typing.agents()).map(|agent| Keyboard::new(agent, ranges)).collect();
+    out.push(play(typing, "keyboard", |agent, time| keyboards[agent].at(time, ranges))?);
     let tremble = |agent: usize, time: f64| side(agent + (time / TREMBLE + 1e-6) as usize);
     out.push(play(trial()?, "speed at 5 Hz", |agent, time| {
         commands.at(if tremble(agent, time) > 0.0 { high } else { low }, 0.0)
@@ -138,7 +139,6 @@ fn play(mut trial: Trial<'_>, name: &str, mut command: impl FnMut(usize, f64) ->
 
 /// Plays a short jump from a stand and a command to go at full speed soon after it.
 fn after_a_jump(mut trial: Trial<'_>, commands: &Commands, button: usize) -> Result<Player, RunError> {
-    let agents = trial.agents();
     let [standing, jumping, landing, going] = JUMP;
     trial.command(|_| commands.rest.clone())?;
     let start = trial.play(standing)?.iter().filter(|track| !track.fallen).count();
@@ -152,7 +152,7 @@ fn after_a_jump(mut trial: Trial<'_>, commands: &Commands, button: usize) -> Res
     trial.command(|agent| commands.at(if agent.is_multiple_of(2) { high } else { low }, 0.0))?;
     fallen += falls(&trial.play(going)?);
     let played = start as f64 * (jumping + landing + going);
-    Ok(Player { agents: start as u64, ..Player::new("full speed 0.2 s after a jump of 0.4 s", agents, fallen, played) })
+    Ok(Player::new("full speed 0.2 s after a jump of 0.4 s", start, fallen, played))
 }
 
 /// Pushes the character over, and commands full speed and rest in turns while it gets up and afterward. An agent that is not up at the
@@ -160,7 +160,7 @@ fn after_a_jump(mut trial: Trial<'_>, commands: &Commands, button: usize) -> Res
 fn while_rising(mut trial: Trial<'_>, commands: &Commands) -> Result<Player, RunError> {
     let agents = trial.agents();
     trial.command(|_| commands.rest.clone())?;
-    trial.play(STANDING)?;
+    trial.play(UPRIGHT)?;
     trial.pushed(PUSH, OVER, |agent| agent as f64 * GOLDEN)?;
     let full = commands.at(commands.range[1], 0.0);
     let told = |turn: usize| if turn.is_multiple_of(2) { full.clone() } else { commands.rest.clone() };

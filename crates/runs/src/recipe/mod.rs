@@ -24,7 +24,7 @@ use marathon_physics::hint::{did_you_mean, nearest};
 use plan::Plan;
 use serde::{Deserialize, Serialize};
 use stage::Work;
-use state::{Changed, Done, StageFile, State};
+use state::{Changed, Done, State};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
@@ -301,7 +301,7 @@ impl RecipeRun {
             if front.stops() {
                 return Ok(stopped());
             }
-            match self.carry_out_stage(i, &done, &about, begun, front)? {
+            match Work::new(&self.plan, i, &done, &about, begun).carry_out(front)? {
                 Some(result) => done.push(Some(result)),
                 None => return Ok(stopped()),
             }
@@ -310,17 +310,6 @@ impl RecipeRun {
         let done: Vec<Done> = done.into_iter().flatten().collect();
         let summary = lineage::finish(&self.plan, &done, &hashes, self.seed)?;
         Ok(End::Complete(Box::new(summary)))
-    }
-
-    fn carry_out_stage(
-        &self,
-        i: usize,
-        done: &[Option<Done>],
-        about: &StageFile,
-        begun: bool,
-        front: &mut Front<'_>,
-    ) -> Result<Option<Done>, RunError> {
-        Work::new(&self.plan, i, done, about, begun).carry_out(front)
     }
 }
 

@@ -10,9 +10,9 @@ use crate::error::RunError;
 use crate::measure::measure;
 use crate::options::{LearnOptions, RunOptions};
 use crate::policy_file;
-use crate::report::kept_policies;
 use crate::report::progress::Rounds;
 use crate::report::summary::Summary;
+use crate::report::{kept_policies, kept_policy};
 use crate::session::Session;
 use crate::task::Task;
 use crate::task_config::TaskOptions;
@@ -276,11 +276,6 @@ impl<'a> Work<'a> {
         };
         step.seeds.iter().map(of_seed).collect()
     }
-}
-
-/// The policy that a run keeps after a number of steps.
-fn kept_policy(folder: &Path, steps: u64) -> PathBuf {
-    folder.join(crate::folder::POLICIES).join(format!("policy-{steps}.safetensors"))
 }
 
 /// Processor seconds of a complete run.

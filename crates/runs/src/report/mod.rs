@@ -115,7 +115,7 @@ impl<'a> Reporter<'a> {
         let folder = self.folder.policies();
         std::fs::create_dir_all(&folder).map_err(RunError::io(&folder, "create folder"))?;
         let steps = policy.meta().training.as_ref().map_or(0, |t| t.steps);
-        policy.save(&folder.join(format!("policy-{steps}.safetensors")))?;
+        policy.save(&kept_policy(self.folder.path(), steps))?;
         Ok(())
     }
 
@@ -142,6 +142,11 @@ impl Observer for Reporter<'_> {
         }
         (self.watch)(stats)
     }
+}
+
+/// The policy that a run keeps after a number of steps.
+pub fn kept_policy(run: &Path, steps: u64) -> PathBuf {
+    run.join(POLICIES).join(format!("policy-{steps}.safetensors"))
 }
 
 /// The policies in `policies/` of a run's folder with their steps, in the order of the steps.
