@@ -4,6 +4,7 @@
 #   fuzz      every reader for ten minutes of processor time (fuzz/run.py)
 #   release   wheels, programs and archives of all platforms that this system can build, tried as a user would
 #   aarch64   the Python tests with the wheel for Arm, under qemu
+#   suites    the Rust tests of physics, motion, environments and learner with NEON under qemu and as WebAssembly in Node
 #   bits      states and weights with SSE2, under qemu with NEON, and with both WebAssembly modules
 #   web       the page in Chromium and Firefox, with five minutes of play
 #   soak      ten million steps of each agent, three hundred models with random meshes
@@ -13,7 +14,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 parts=("$@")
 if [ $# = 0 ]; then
-  parts=(fuzz release aarch64 bits web soak crates player)
+  parts=(fuzz release aarch64 suites bits web soak crates player)
 fi
 for part in "${parts[@]}"; do
   echo "tests/long.sh: $part" >&2
@@ -27,6 +28,7 @@ for part in "${parts[@]}"; do
       release/build.sh wheel-aarch64
       tests/aarch64.sh release/dist/marathon_rl-*manylinux*aarch64*.whl
       ;;
+    suites) tests/lanes/suites.sh ;;
     bits)
       cargo test --release -p marathon-wasm --features baseline --test bits
       rustup --quiet target add aarch64-unknown-linux-musl
@@ -45,6 +47,6 @@ for part in "${parts[@]}"; do
       cargo test --release --workspace --test a_stranger_plays -- --ignored --nocapture
       MARATHON_TEST_LONG=yes cargo test --release --workspace --test the_camera_stays_outside -- --nocapture
       ;;
-    *) echo "tests/long.sh: no part '$part'; there are fuzz, release, aarch64, bits, web, soak, crates and player" >&2 && exit 2 ;;
+    *) echo "tests/long.sh: no part '$part'; there are fuzz, release, aarch64, suites, bits, web, soak, crates and player" >&2 && exit 2 ;;
   esac
 done

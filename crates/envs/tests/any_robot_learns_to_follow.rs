@@ -1,5 +1,7 @@
 //! The task for any model finds out what it needs: root, standing pose, feet, servos and speeds.
 
+mod common;
+
 use marathon_envs::agents::robot::arguments::RobotArguments;
 use marathon_envs::agents::robot::rig::Rig;
 use marathon_envs::agents::robot::servos::Drive;
@@ -60,8 +62,7 @@ fn feet_and_their_order_are_found() {
 
 #[test]
 fn what_is_no_robot_is_refused() {
-    let folder = std::env::temp_dir().join(format!("marathon-no-robots-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a folder");
+    let folder = common::scratch("no-robots");
     let file = |name: &str, text: &str| -> PathBuf {
         let path = folder.join(name);
         std::fs::write(&path, text).expect("a file");
@@ -135,7 +136,7 @@ fn a_bare_model_is_made_ready() {
         assert!(bare.contains(old), "{old}");
         bare = bare.replace(old, new);
     }
-    let file = std::env::temp_dir().join(format!("marathon-bare-{}.xml", std::process::id()));
+    let file = common::scratch("bare").join("quadruped.xml");
     std::fs::write(&file, bare).expect("a file");
     let name = file.to_string_lossy().into_owned();
     let arguments = RobotArguments::default().with(&Options::new().with("xml_file", name.as_str()));
@@ -177,7 +178,7 @@ fn straight_knees_bend() {
         let mut spec = marathon_physics::spec::ModelSpec::from_xml_file(asset(file)).expect("a model");
         let straight = spec.compile().expect("a model").qpos0;
         spec.add(marathon_physics::spec::Keyframe::new("home").qpos(&straight)).expect("a keyframe");
-        let path = std::env::temp_dir().join(format!("marathon-knees-{}.xml", std::process::id()));
+        let path = common::scratch("knees").join("robot.xml");
         std::fs::write(&path, spec.to_xml()).expect("a file");
         let name = path.to_string_lossy().into_owned();
         let chosen = RobotArguments::default().with(&Options::new().with("xml_file", name.as_str()));
@@ -202,8 +203,7 @@ fn cart(actuator: &str, wheel: &str) -> Rig {
         "<mujoco><worldbody><body name='cart' pos='0 0 .15'><freejoint/><geom type='box' size='.3 .2 .05'/>{wheels}</body>\
          </worldbody><actuator>{actuators}</actuator></mujoco>"
     );
-    let name = format!("marathon-cart-{}-{}.xml", std::process::id(), actuator.len() + wheel.len());
-    let path = std::env::temp_dir().join(name);
+    let path = common::scratch(&format!("cart-{}", actuator.len() + wheel.len())).join("cart.xml");
     std::fs::write(&path, text).expect("a file");
     let arguments = RobotArguments::default().with(&Options::new().with("xml_file", path.to_string_lossy().as_ref()));
     let rig = Rig::new(&arguments).unwrap_or_else(|error| panic!("{error}"));

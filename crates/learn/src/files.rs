@@ -47,7 +47,7 @@ impl AtomicFile {
         // a short name of fixed length: the file's own name may have the maximum length
         let name = checksum(path.file_name().unwrap_or_default().as_encoded_bytes());
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
-        let temporary = path.with_file_name(format!(".{name}-{number}.{}.tmp", std::process::id()));
+        let temporary = path.with_file_name(format!(".{name}-{number}.{}.tmp", marathon_physics::process_id()));
         // never write through an existing link
         let new = || File::options().write(true).create_new(true).open(&temporary);
         let file = new().or_else(|error| match error.kind() {

@@ -145,7 +145,7 @@ fn interruptions_and_threads_change_nothing() {
             n if n < stop => Control::Continue,
             _ => Control::Stop,
         };
-        let folder = tempfile::tempdir().unwrap();
+        let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
         let part = train(&*relay(true), Isa::best(), &config(12), None, &mut watch).unwrap();
         part.checkpoint.save(folder.path()).unwrap();
         let checkpoint = Checkpoint::load(folder.path()).unwrap();

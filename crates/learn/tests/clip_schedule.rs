@@ -8,7 +8,7 @@ use marathon_physics::lanes::Isa;
 
 fn parameters(config: &TrainConfig, resume: Option<Checkpoint>) -> Vec<f32> {
     let output = train(&PuckTask::new(), Isa::best(), config, resume, &mut silent).unwrap();
-    let dir = tempfile::tempdir().unwrap();
+    let dir = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
     let file = dir.path().join("policy.safetensors");
     output.policy.save(&file).unwrap();
     // only the tensors: the headers have different configurations

@@ -5,7 +5,7 @@
 mod common;
 
 use common::numbers::{noise, noise_f32, worst};
-use common::oracle::ask_torch;
+use common::oracle;
 use common::{PuckTask, learning_config, silent, small_config};
 use marathon_envs::{BlockStep, Demonstrations, EnvError, ObsGroup, Shard, ShardFactory, Spec};
 use marathon_learn::lanes::buffer::Blocks;
@@ -89,7 +89,7 @@ fn the_gradient_with_its_penalty_is_pytorchs() {
         }));
         found.push(((form, activation), gradient));
     }
-    let answers = ask_torch("torch_discriminator.py", &request.into());
+    let answers = oracle("torch_discriminator.py", &request.into());
     for ((case, gradient), want) in found.iter().zip(answers.as_array().expect("a list")) {
         let want: Vec<f64> = want["gradient"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
         assert_eq!(gradient.len(), want.len());
@@ -234,7 +234,7 @@ fn resumed_run_has_the_bits_of_an_uninterrupted_one() {
         train(&Unrewarded::new(30), Isa::best(), &small(Form::Amp), resume, &mut observer).unwrap()
     };
     let whole = run(None, 0);
-    let dir = tempfile::tempdir().unwrap();
+    let dir = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
     run(None, 2).checkpoint.save(dir.path()).unwrap();
     let resumed = run(Some(Checkpoint::load(dir.path()).unwrap()), 0);
     assert_eq!(resumed.policy.params(), whole.policy.params());

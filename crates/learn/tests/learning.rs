@@ -108,7 +108,9 @@ fn observer_can_stop_and_looks_at_every_iteration() {
     let output = train(&PuckTask::new(), Isa::best(), &learning_config(), None, &mut observer).unwrap();
     let last = output.last.unwrap();
     assert_eq!((seen, last.iteration), (vec![4096, 8192, 12288], 3));
-    assert!(last.cpu_seconds > 0.0 && last.learned.reward_terms.len() == 2);
+    // WebAssembly has no clock of processor time
+    assert!(cfg!(target_family = "wasm") || last.cpu_seconds > 0.0);
+    assert_eq!(last.learned.reward_terms.len(), 2);
 }
 
 /// A non-finite number in one observation of every episode of one agent does not keep the others from learning.

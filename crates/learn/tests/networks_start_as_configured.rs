@@ -14,7 +14,7 @@ fn parameters(initialization: Init) -> Vec<f64> {
         (config.network.hidden, config.network.critic_hidden) = (vec![8], Some(vec![400]));
     });
     let trainer = TrainLoop::new(&PuckTask::new(), Isa::best(), &config).unwrap();
-    let folder = tempfile::tempdir().unwrap();
+    let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
     trainer.checkpoint().save(folder.path()).unwrap();
     let files = std::fs::read_dir(folder.path()).unwrap().map(|file| file.unwrap().path());
     let state = files.into_iter().find(|path| path.extension().is_some_and(|e| e == "safetensors")).unwrap();

@@ -65,7 +65,7 @@ fn a_file_without_a_checksum_is_refused_with_the_command_that_writes_one() {
     let advice =
         "checksum: found none, expected one; `marathon import puck.safetensors --out NEW.safetensors` writes it";
     assert_eq!(refusal(&bytes), format!("puck.safetensors: {advice}"));
-    let folder = tempfile::tempdir().unwrap();
+    let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
     let path = folder.path().join("puck.safetensors");
     std::fs::write(&path, &bytes).unwrap();
     assert_eq!(Policy::load_unsealed(&path).unwrap(), policy);

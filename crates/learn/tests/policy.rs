@@ -22,7 +22,7 @@ fn observations(blocks: usize) -> Vec<f32> {
 
 #[test]
 fn reloaded_policy_acts_alike_on_every_width_and_row_by_row() {
-    let dir = tempfile::tempdir().unwrap();
+    let dir = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
     for activation in Activation::ALL {
         let path = dir.path().join(format!("{}.safetensors", activation.name()));
         let policy = trained(activation);
@@ -52,7 +52,7 @@ fn reloaded_policy_acts_alike_on_every_width_and_row_by_row() {
 
 #[test]
 fn file_says_what_it_is() {
-    let dir = tempfile::tempdir().unwrap();
+    let dir = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
     let path = dir.path().join("puck.safetensors");
     let mut policy = trained(Activation::Tanh);
     let options = EvalOptions { episodes: 20, ..Default::default() };
@@ -72,7 +72,7 @@ fn file_says_what_it_is() {
 
 #[test]
 fn policy_of_another_agent_is_refused() {
-    let dir = tempfile::tempdir().unwrap();
+    let dir = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
     let path = dir.path().join("puck.safetensors");
     trained(Activation::Tanh).save(&path).unwrap();
     let other = PuckTask::new().renamed("Hopper-v0");
@@ -85,7 +85,7 @@ fn policy_of_another_agent_is_refused() {
 
 #[test]
 fn damaged_policies_never_panic() {
-    let dir = tempfile::tempdir().unwrap();
+    let dir = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
     let path = dir.path().join("puck.safetensors");
     trained(Activation::Swish).save(&path).unwrap();
     let bytes = std::fs::read(&path).unwrap();

@@ -44,7 +44,7 @@ fn so_have_those_of_the_other_algorithms() {
 }
 
 fn resumed_run_is_whole(config: &TrainConfig, rollouts: u64) {
-    let dir = tempfile::tempdir().unwrap();
+    let dir = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
     let whole = dir.path().join("whole");
     run(config, None).unwrap().save(&whole).unwrap();
     let iterations = config.run.total_steps / (rollouts * config.run.rollout_steps());
@@ -99,7 +99,7 @@ fn checkpoint_of_something_else_is_refused() {
 
 #[test]
 fn damaged_checkpoints_are_refused() {
-    let dir = tempfile::tempdir().unwrap();
+    let dir = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
     let folder = dir.path();
     run(&small_config(), None).unwrap().save(folder).unwrap();
     let description = folder.join("checkpoint.json");
@@ -179,7 +179,7 @@ fn damaged_checkpoints_are_refused() {
 /// A flipped bit in the description, as from a bad disk, is either detected or has no effect.
 #[test]
 fn a_flipped_bit_is_refused_or_changes_nothing() {
-    let dir = tempfile::tempdir().unwrap();
+    let dir = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
     let folder = dir.path();
     run(&small_config(), None).unwrap().save(folder).unwrap();
     let whole = Checkpoint::load(folder).unwrap();

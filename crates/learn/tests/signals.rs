@@ -104,7 +104,7 @@ fn resumed_run_has_the_bits_of_an_uninterrupted_one() {
     };
     let whole = run(None, 0);
     let half = run(None, 2).checkpoint;
-    let dir = tempfile::tempdir().unwrap();
+    let dir = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
     half.save(dir.path()).unwrap();
     let resumed = run(Some(Checkpoint::load(dir.path()).unwrap()), 0);
     assert_eq!(resumed.policy.params(), whole.policy.params());

@@ -67,7 +67,7 @@ fn learning_does_not_notice() {
 
 #[test]
 fn interruptions_and_threads_change_nothing() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
     let whole = run(&config(PART), None).policy;
     let mut stop = |stats: &IterationStats, _: &Snapshot<'_>| match stats.iteration {
         0..5 => Control::Continue,

@@ -3,7 +3,7 @@
 mod common;
 
 use common::numbers::noise_f32 as noise;
-use common::oracle::ask_torch;
+use common::oracle;
 use marathon_learn::algorithms::loss::{Loss, LossSums, Objective};
 use marathon_learn::lanes::buffer::Blocks;
 use marathon_learn::nets::gaussian::Gaussian;
@@ -160,7 +160,7 @@ fn networks_losses_and_gradients_agree_with_pytorch() {
     let cases: Vec<Case> =
         Activation::ALL.into_iter().flat_map(|a| losses.map(|(ratio, clip)| Case::new(a, ratio, clip))).collect();
     let request: Vec<Value> = cases.iter().map(Case::request).collect();
-    let answers = ask_torch("torch_ppo.py", &request.into());
+    let answers = oracle("torch_ppo.py", &request.into());
     for (case, want) in cases.iter().zip(answers.as_array().expect("a list")) {
         case.check::<f32>(want);
         case.check::<F32x4>(want);

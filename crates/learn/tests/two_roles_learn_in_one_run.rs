@@ -314,7 +314,7 @@ fn a_run_goes_on_from_its_checkpoint_with_the_same_bits() {
         let whole = run(&*task, &config);
         let mut once = |_: &IterationStats, _: &Snapshot<'_>| Control::Stop;
         let part = train(&*task, Isa::best(), &config, None, &mut once).unwrap();
-        let folder = tempfile::tempdir().unwrap();
+        let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
         part.checkpoint.save(folder.path()).unwrap();
         let loaded = Checkpoint::load(folder.path()).unwrap();
         let rest = train(&*task, Isa::best(), &config, Some(loaded), &mut silent).unwrap();

@@ -7,6 +7,7 @@
 //! * [`lanes`] has the number type that carries every kernel: `f64`, `f32`, or 4, 8, 16 agents in one vector.
 //!
 //! * [`hint`] suggests a known name for an unknown one in an error.
+//! * [`threads()`] chooses a number of threads.
 //! * [`budget`] limits the memory and time that a file or a message can use.
 //!
 //! Each folder imports only from folders above it in this list:
@@ -32,6 +33,9 @@
 //! | `batch` | any number of agents on any number of threads |
 
 pub mod hint;
+
+mod threads;
+pub use threads::{process_id, threads};
 
 pub mod budget;
 

@@ -3,6 +3,9 @@
 //! Everything whose size a file decides is checked against the budget (`MARATHON_LIMITS`) before work starts. No step of the
 //! reader takes quadratic time.
 
+#[cfg(unix)]
+mod common;
+
 use marathon_physics::{Model, Sim, SimOptions};
 use std::time::{Duration, Instant};
 
@@ -108,8 +111,7 @@ fn reading_takes_time_in_proportion() {
 #[cfg(unix)]
 #[test]
 fn includes_share_one_budget() {
-    let folder = std::env::temp_dir().join(format!("marathon-includes-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).unwrap();
+    let folder = common::scratch("includes");
     std::os::unix::fs::symlink(".", folder.join("d")).unwrap();
     let paths = repeat(30, |i| format!("<include file='{}a.xml'/>", "d/".repeat(1 + i)));
     std::fs::write(folder.join("main.xml"), format!("<mujoco>{paths}</mujoco>")).unwrap();

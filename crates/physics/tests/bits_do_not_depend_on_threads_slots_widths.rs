@@ -77,6 +77,7 @@ fn models() -> Vec<Model> {
         "full/actuators_rk4",
         "full/medium",
         "convex/heap",
+        "convex/arm_of_meshes",
     ]
     .map(|n| dir.join(format!("crates/physics/tests/models/{n}.xml")));
     let capped = ["capped/quadruped", "capped/four_legs", "full/pile", "full/elliptic"]

@@ -14,7 +14,7 @@ use marathon_physics::mjcf::MjcfErrorKind;
 use marathon_physics::model::{Geom, GeomType, Hull};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 const SEED: u32 = 1;
 /// Random models; with the variable MARATHON_TEST_LONG, which `tests/long.sh soak` sets, three times as many.
@@ -200,19 +200,17 @@ fn compare(answer: &Value) -> usize {
 
 #[test]
 fn random_meshes() {
-    let folder = std::env::temp_dir().join(format!("marathon-meshes-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a folder");
+    let folder = common::scratch("meshes");
     let count = if std::env::var_os("MARATHON_TEST_LONG").is_some() { 3 * MODELS } else { MODELS };
     let answer = oracle("meshes.py", &json!({"folder": folder, "seed": SEED, "count": count}));
     let loaded = compare(&answer);
     assert!(loaded > count / 2, "only {loaded} of {count} models are sound");
-    std::fs::remove_dir_all(Path::new(&folder)).expect("the folder is there");
+    std::fs::remove_dir_all(&folder).expect("the folder is there");
 }
 
 /// Writes models with one mesh each, and compares them with MuJoCo's.
 fn written(name: &str, meshes: &[&str]) -> (PathBuf, Value) {
-    let folder = std::env::temp_dir().join(format!("marathon-{name}-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a folder");
+    let folder = common::scratch(name);
     let write = |(i, mesh): (usize, &&str)| {
         let path = folder.join(format!("{i}.xml"));
         let geom = "<body><freejoint/><geom type='mesh' mesh='m'/></body>";

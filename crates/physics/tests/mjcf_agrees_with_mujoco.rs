@@ -74,7 +74,7 @@ fn edited_models() {
     spec.add(HField::new("hills", 2, 3, [5.0, 5.0, 1.0, 1.0]).elevation(&[0.0, 0.5, 1.0, 0.0, 1.0, 2.0]))
         .expect("a free name");
     spec.replace("floor", Geom::hfield("hills").collision(0, 1)).expect("a floor");
-    let file = std::env::temp_dir().join(format!("marathon-edited-{}.xml", std::process::id()));
+    let file = common::scratch("edited").join("marathon_man.xml");
     std::fs::write(&file, spec.to_xml()).expect("a file");
     assert!(Model::from_xml_file(&file).expect("a model") == spec.compile().expect("a model"));
     compare(std::slice::from_ref(&file));

@@ -3,6 +3,8 @@
 //! Unsupported elements that would change the dynamics are refused in the same way. Nothing is skipped silently. Each
 //! row below is a model with one mistake, and the required parts of the message.
 
+#[cfg(unix)]
+mod common;
 #[path = "common/refusal.rs"]
 mod refusal;
 
@@ -483,7 +485,7 @@ fn includes() {
 #[cfg(unix)]
 #[test]
 fn what_is_no_file_is_not_read() {
-    let folder = std::env::temp_dir().join(format!("marathon-mjcf-{}", std::process::id()));
+    let folder = common::scratch("no-files");
     std::fs::create_dir_all(folder.join("folder")).unwrap();
     let made = std::process::Command::new("mkfifo").arg(folder.join("pipe")).status().unwrap();
     assert!(made.success());

@@ -28,10 +28,8 @@ use marathon_physics::{Group, MeasurePlan, Model, Readings, Sim, SimOptions, Wor
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::io::{BufRead, BufReader, Write};
 use std::ops::Range;
 use std::path::PathBuf;
-use std::process::{Command, Stdio};
 
 /// Seeds of the models that are drawn by default.
 const SEEDS: Range<u64> = 0..150;
@@ -301,25 +299,17 @@ fn seeds() -> Range<u64> {
 fn random_models_agree_with_mujoco() {
     let seeds = seeds();
     let count = seeds.end.saturating_sub(seeds.start);
-    let mut child = Command::new(common::python())
-        .arg(common::workspace().join("tests/oracle/random_models.py"))
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("Python starts");
     let job = json!({"first": seeds.start, "count": count, "states": STATES});
-    child.stdin.take().expect("piped").write_all(job.to_string().as_bytes()).expect("the oracle reads its job");
     let folder = std::env::var_os("MARATHON_OUT").map(PathBuf::from);
     let mut report = Report::default();
-    for line in BufReader::new(child.stdout.take().expect("piped")).lines() {
-        let answer: Answer = serde_json::from_str(&line.expect("a line of text")).expect("an answer in JSON");
+    for line in common::oracle_text("random_models.py", &job).lines() {
+        let answer: Answer = serde_json::from_str(line).expect("an answer in JSON");
         report.add(&answer);
         if let (Some(folder), true) = (&folder, report.failures.contains_key(&answer.seed)) {
             std::fs::create_dir_all(folder).expect("the folder can be made");
             std::fs::write(folder.join(format!("{}.xml", answer.seed)), &answer.xml).expect("the model can be written");
         }
     }
-    assert!(child.wait().expect("the oracle ends").success());
     println!(
         "{} models ({} with low caps), {} states ({} with contacts, {} weightless, {} in single precision), {} draws left out; within the bounds at most \
          {:.0e} in double precision and {:.0e} in single",

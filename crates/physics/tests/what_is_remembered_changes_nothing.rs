@@ -2,6 +2,9 @@
 //! apart to touch, pushing rows) saves work and changes nothing. Agents end where they end when every step is a
 //! separate call, which starts without that data. Contacts agree exactly. States have the same bits in all but a few
 //! calls, in which the solver takes another path to the same forces, up to rounding.
+//!
+//! From one call to the next, a batch remembers how far pairs of geoms are apart. That changes no bit: a new batch for every step ends
+//! with the same states and contacts.
 
 mod common;
 
@@ -88,4 +91,47 @@ fn ant() {
 #[test]
 fn hopper() {
     every_width("agents/hopper.xml");
+}
+
+/// Steps a batch, and a new one for each step. States jump now and then, as after a reset.
+fn nothing_is_kept(model: &Model, isa: Isa) {
+    let batch = || Batch::new(model, &BatchOptions { agents: AGENTS, isa, ..Default::default() }).expect("supported");
+    let (mut kept, mut random) = (batch(), Uniform(5));
+    let mut contacts = 0;
+    for step in 0..200 {
+        if step % 50 == 0 {
+            for agent in (0..AGENTS).filter(|agent| (agent + step / 50) % 2 == 0) {
+                let qpos: Vec<f64> = model.qpos0.iter().map(|q| q + 0.3 * random.next()).collect();
+                let qvel: Vec<f64> = (0..model.nv).map(|_| 3.0 * random.next()).collect();
+                kept.reset(agent, &qpos, &qvel);
+            }
+        }
+        let ctrl: Vec<f64> = (0..AGENTS * model.nu).map(|_| random.next()).collect();
+        let mut new = batch();
+        new.restore(&kept.snapshot());
+        let before = [kept.stats().contacts, new.stats().contacts];
+        kept.step(&ctrl, 1);
+        new.step(&ctrl, 1);
+        let found = [kept.stats().contacts - before[0], new.stats().contacts - before[1]];
+        assert_eq!(found[0], found[1], "{} on {isa:?}: contacts of step {step}", model.name);
+        assert!(difference(&kept, &new) == 0.0, "{} on {isa:?}: step {step}", model.name);
+        contacts += found[0];
+    }
+    assert!(contacts > 0, "{}: nothing touched anything", model.name);
+}
+
+#[test]
+fn distances_of_pairs_are_kept_without_a_trace() {
+    for file in [
+        "crates/physics/tests/models/convex/arm_of_meshes.xml",
+        "crates/physics/tests/models/convex/humanoid_mesh_feet.xml",
+        "crates/physics/tests/models/convex/heap.xml",
+        "crates/physics/tests/models/full/mocap.xml",
+        "assets/dm_control/humanoid.xml",
+    ] {
+        let model = Model::from_xml_file(common::workspace().join(file)).unwrap_or_else(|e| panic!("{e}"));
+        for isa in [Isa::F64, Isa::F32, Isa::best()] {
+            nothing_is_kept(&model, isa);
+        }
+    }
 }

@@ -27,6 +27,9 @@ const AGENTS_PER_THREAD: usize = 64;
 /// Size of an agent's allocations, bytes.
 const OVERHEAD: usize = 500;
 
+/// Largest number of pairs of geoms that count in an agent's memory.
+const MOST_PAIRS: usize = 1 << 14;
+
 /// Quantities that are read together, because all come from the frames of the bodies.
 const FRAMES: [Quantity; 6] = [
     Quantity::BodyPos,
@@ -71,8 +74,8 @@ impl Simulation {
             let (found, best) = (isa.name(), Isa::best().name());
             return Err(error::value(format!("cannot run isa '{found}': {obstacle}; the best is '{best}'")));
         }
-        let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
-        let threads = if threads == 0 { cores().min(num_envs.div_ceil(AGENTS_PER_THREAD)) } else { threads };
+        let useful = if threads == 0 { num_envs.div_ceil(AGENTS_PER_THREAD) } else { threads };
+        let threads = marathon_physics::threads(threads).min(useful);
         if threads > MOST_THREADS {
             return Err(error::value(format!("threads is {threads}, expected at most {MOST_THREADS}")));
         }
@@ -440,7 +443,10 @@ fn agent_bytes(model: &marathon_physics::Model) -> f64 {
     let contacts = 6 * model.geoms.len();
     let sensors: usize = model.sensors.iter().map(|sensor| sensor.dim).sum();
     let ground: usize = model.hfields.iter().map(|field| field.nrow * field.ncol).sum();
-    (8 * (state + frames + contacts + sensors + ground) + OVERHEAD) as f64
+    // what physics keeps of pairs of geoms
+    let colliding = model.geoms.iter().filter(|geom| geom.contype != 0 || geom.conaffinity != 0).count();
+    let pairs = (colliding * colliding / 2).min(MOST_PAIRS);
+    (8 * (state + frames + contacts + sensors + ground + pairs) + OVERHEAD) as f64
 }
 
 impl Simulation {

@@ -64,10 +64,7 @@ impl Renderer {
         let view = View::new(frame, camera, [width, height]);
         static ENCODER: LazyLock<Encoder> = LazyLock::new(Encoder::new);
         let encoder = &*ENCODER;
-        let threads = match self.threads {
-            0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
-            n => n,
-        };
+        let threads = marathon_physics::threads(self.threads);
 
         // first pass: one ray through the middle of each pixel, or all rays of a grid
         let side = if let Antialias::Grid(side) = self.antialias { side.clamp(1, 8) } else { 1 };

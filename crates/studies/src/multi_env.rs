@@ -43,7 +43,7 @@ pub fn run(options: &Options) -> Result<Record, StudyError> {
 
     let program = std::env::current_exe().map_err(StudyError::io(Path::new("marathon-studies"), "find"))?;
     let factory = registry::factory(AGENT, Isa::best())?;
-    let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+    let cores = marathon_physics::threads(0);
     let base = config::default_for(AGENT).config.with(|c| c.run.total_steps = options.steps());
     // one agent with rollouts of the same size, for about the same time
     let solo = base.clone().with(|c| {

@@ -87,7 +87,7 @@ impl Head {
 
 /// Processors that this program may use.
 pub fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, |n| n.get())
+    marathon_physics::threads(0)
 }
 
 /// The chosen instruction sets, or all of the processor.

@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use marathon_physics::lanes::Real;
-use marathon_physics::{Variation, Work};
+use marathon_physics::{Group, Variation, Work};
 
 use super::context::LaneContext;
 use super::decision::Task;
@@ -40,7 +40,7 @@ impl<T: Real> ShardFactory for AgentFactory<T> {
         let own = 2 * model.nu + model.na + 6 * model.bodies.len() + 3 * facts.memory + model.nq + model.nv;
         // ground is stored once in the lanes' precision, and once more if starts draw it
         let ground: usize = model.hfields.iter().map(|field| field.nrow * field.ncol).sum();
-        spec.agent_bytes() + NUMBER * own + 2 * size_of::<f32>() * ground
+        spec.agent_bytes() + NUMBER * own + 2 * size_of::<f32>() * ground + Group::kept_bytes(&self.task.data.sim)
     }
 
     fn demonstrations(&self) -> Option<Demonstrations> {

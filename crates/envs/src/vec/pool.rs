@@ -1,8 +1,8 @@
 //! The threads of an environment.
 
-use rayon::{ThreadPool, ThreadPoolBuilder};
-
 use crate::error::EnvError;
+use marathon_physics::process_id;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// The thread pool of this process. A forked process has the memory of its parent's pool but none of its threads, and
 /// would wait for them forever. It therefore creates its own pool.
@@ -15,14 +15,14 @@ pub(crate) struct Pool {
 impl Pool {
     pub fn new(threads: usize) -> Result<Self, EnvError> {
         let pool = Some(start(threads)?);
-        Ok(Pool { threads, process: std::process::id(), pool })
+        Ok(Pool { threads, process: process_id(), pool })
     }
 
     /// The pool of the present process.
     pub fn get(&mut self) -> Result<&ThreadPool, EnvError> {
-        if self.process != std::process::id() {
+        if self.process != process_id() {
             self.forget();
-            self.process = std::process::id();
+            self.process = process_id();
         }
         let pool = match self.pool.take() {
             Some(pool) => pool,
@@ -39,7 +39,7 @@ impl Pool {
 
 impl Drop for Pool {
     fn drop(&mut self) {
-        if self.process != std::process::id() {
+        if self.process != process_id() {
             self.forget();
         }
     }

@@ -67,8 +67,7 @@ impl VecEnv {
         let mut spec = factory.spec().clone();
         spec.max_episode_steps = options.max_episode_steps.unwrap_or(spec.max_episode_steps);
         let blocks = options.agents.div_ceil(BLOCK);
-        let cores = || std::thread::available_parallelism().map_or(1, |n| n.get());
-        let threads = if options.threads == 0 { cores() } else { options.threads }.min(blocks);
+        let threads = marathon_physics::threads(options.threads).min(blocks);
         let share = blocks.div_ceil(threads);
         let workers: Vec<_> = (0..blocks)
             .step_by(share)

@@ -4,53 +4,15 @@
 #[path = "../../../physics/tests/common/numbers.rs"]
 pub mod numbers;
 
-use std::io::Write;
-use std::path::PathBuf;
-use std::process::{Command, Stdio};
+#[path = "../../../physics/tests/common/oracle.rs"]
+mod oracle;
 
 use marathon_envs::{AgentState, Autoreset, Options, Step, VecEnv, VecEnvOptions};
 use marathon_motion::kinematics::Pose;
 use marathon_physics::Model;
 use marathon_physics::lanes::Isa;
-use serde_json::Value;
-
-/// The root of the repository.
-fn workspace() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
-
-/// The Python that has the packages of the oracles.
-fn python() -> PathBuf {
-    std::env::var_os("MARATHON_PYTHON").map_or_else(|| workspace().join(".venv/bin/python"), PathBuf::from)
-}
-
-/// Runs a Python script of `tests/oracle`: JSON in, JSON out.
-pub fn oracle(script: &str, request: &Value) -> Value {
-    let (root, python) = (workspace(), python());
-    let spawned = Command::new(&python)
-        .arg(root.join("tests/oracle").join(script))
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn();
-    let mut child = match spawned {
-        Ok(child) => child,
-        Err(e) => panic!("{}: {e}; run ./test.sh, which sets up .venv, or set MARATHON_PYTHON", python.display()),
-    };
-    let mut stdin = child.stdin.take().expect("stdin is piped");
-    stdin.write_all(request.to_string().as_bytes()).expect("the oracle reads its request");
-    drop(stdin);
-    let output = child.wait_with_output().expect("the oracle ends");
-    assert!(output.status.success(), "{script} failed");
-    serde_json::from_slice(&output.stdout).expect("the oracle prints JSON")
-}
-
-/// Folder of an installed Python package.
-pub fn package(name: &str) -> PathBuf {
-    let code = format!("import importlib.util,os;print(os.path.dirname(importlib.util.find_spec('{name}').origin))");
-    let output = Command::new(python()).args(["-c", &code]).output().expect("Python starts");
-    assert!(output.status.success(), "package {name} is not installed: run ./test.sh");
-    PathBuf::from(String::from_utf8(output.stdout).expect("a path").trim())
-}
+#[allow(unused_imports, reason = "every test file uses a part")]
+pub use oracle::{oracle, package, scratch};
 
 /// The suite's own agents, whose rewards end with a termination term.
 pub fn own_agents() -> Vec<String> {

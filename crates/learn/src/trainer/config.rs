@@ -284,11 +284,7 @@ impl RunConfig {
     }
     /// Threads that a run uses: the configured or available number, at most one per block.
     pub fn worker_count(&self) -> usize {
-        let wanted = match self.threads {
-            0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
-            n => n,
-        };
-        wanted.clamp(1, self.blocks().max(1))
+        marathon_physics::threads(self.threads).min(self.blocks()).max(1)
     }
 }
 

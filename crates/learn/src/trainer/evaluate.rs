@@ -77,13 +77,8 @@ pub fn evaluate_roles(
     let blocks = at_once.unwrap_or(slots).div_ceil(BLOCK);
     // slot i plays episodes i, i + slots, ...
     let quota = |slot: usize| if slot < slots { (options.episodes - slot).div_ceil(slots) } else { 0 };
-    let threads = match options.threads {
-        // a thread whose agents are done must not leave the others waiting
-        _ if at_once.is_some() => 1,
-        0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
-        n => n,
-    };
-    let threads = threads.clamp(1, blocks);
+    // a thread whose agents are done must not leave the others waiting
+    let threads = if at_once.is_some() { 1 } else { marathon_physics::threads(options.threads).clamp(1, blocks) };
     let part = |id: usize| {
         let (first, end) = (blocks * id / threads, blocks * (id + 1) / threads);
         let quotas: Vec<usize> = (first * BLOCK..end * BLOCK).map(quota).collect();

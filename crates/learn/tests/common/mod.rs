@@ -3,10 +3,13 @@
 #![allow(dead_code, reason = "every test file uses a part")]
 
 pub mod numbers;
-pub mod oracle;
+#[path = "../../../physics/tests/common/oracle.rs"]
+mod oracle;
 
 use marathon_envs::{BLOCK, BlockStep, EnvError, Metric, MetricSource, Options, Shard, ShardFactory, Spec};
 use marathon_learn::{Algorithm, Ppo, Sac, TrainConfig};
+#[allow(unused_imports, reason = "every test file uses a part")]
+pub use oracle::oracle;
 
 /// Per agent: position, velocity and drift in two axes, decisions of the episode, random state.
 #[derive(Clone, Copy, Default)]

@@ -3,17 +3,19 @@
 #![allow(dead_code)]
 
 pub mod bvh;
+#[path = "../../../physics/tests/common/oracle.rs"]
+mod oracle;
 
 use marathon_motion::{About, Clip, Cycle, Layout};
 use marathon_physics::Model;
+#[allow(unused_imports, reason = "every test file uses a part")]
+pub use oracle::oracle;
 use serde_json::Value;
-use std::io::Write;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::path::PathBuf;
 
 /// A file of the repository.
 pub fn file(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(name)
+    oracle::workspace().join(name)
 }
 
 /// An agent's model.
@@ -77,32 +79,6 @@ pub fn wave(model: &Model, time: f64, cycle: Cycle) -> Vec<f64> {
         qpos[joint.qpos_adr] = middle + half * (angle + k as f64).sin();
     }
     qpos
-}
-
-/// The Python that has MuJoCo.
-fn python() -> PathBuf {
-    if let Some(path) = std::env::var_os("MARATHON_PYTHON") {
-        return path.into();
-    }
-    let path = file(".venv/bin/python");
-    assert!(path.exists(), "no Python with MuJoCo at {}: run ./test.sh, which sets up .venv", path.display());
-    path
-}
-
-/// Runs a script of `tests/oracle`.
-pub fn oracle(script: &str, input: &Value) -> Value {
-    let mut child = Command::new(python())
-        .arg(file("tests/oracle").join(script))
-        // MuJoCo writes a log of its warnings to the working directory
-        .current_dir(std::env::temp_dir())
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("Python starts");
-    child.stdin.take().expect("piped").write_all(input.to_string().as_bytes()).expect("the oracle reads its input");
-    let output = child.wait_with_output().expect("the oracle ends");
-    assert!(output.status.success(), "the oracle failed: run ./test.sh, which sets up its packages");
-    serde_json::from_slice(&output.stdout).expect("the oracle prints JSON")
 }
 
 /// Rows of an oracle's answer.

@@ -1,5 +1,6 @@
 //! The threads that step a batch.
 
+use crate::threads::{process_id, threads};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Threads that help the calling thread. They start at first use and sleep between uses.
@@ -12,7 +13,7 @@ pub(super) struct Helpers {
 
 impl Helpers {
     pub fn new(count: usize) -> Self {
-        Helpers { count, pool: None }
+        Helpers { count: threads(count + 1) - 1, pool: None }
     }
 
     /// Runs all jobs and returns when they have finished. The first job runs on the calling thread, the others on
@@ -33,7 +34,7 @@ impl Helpers {
         if self.count == 0 {
             return None;
         }
-        let process = std::process::id();
+        let process = process_id();
         if self.pool.as_ref().is_some_and(|(of, _)| *of != process) {
             self.forget();
         }
@@ -53,13 +54,13 @@ impl Helpers {
 
 impl Drop for Helpers {
     fn drop(&mut self) {
-        if self.pool.as_ref().is_some_and(|(of, _)| *of != std::process::id()) {
+        if self.pool.as_ref().is_some_and(|(of, _)| *of != process_id()) {
             self.forget();
         }
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(target_family = "wasm")))]
 mod tests {
     use super::*;
     use std::collections::BTreeSet;

@@ -28,7 +28,7 @@ kernel_fn! {
 fn surround<T: Real>(sim: &Sim<T>, work: &Work<T>, broad: &Broad<T::Scalar>, geom: usize) -> [V3<T::Scalar>; 2] {
     let (model, mount) = (&sim.model.geoms[geom], &sim.geoms[geom]);
     let size = [T::lit(model.size[0]), T::lit(model.size[1]), T::lit(model.size[2])];
-    let axis = &work.contacts.directions[geom];
+    let axis = &work.contacts.places.directions[geom];
     let mut half = [T::zero(); 3];
     match model.kind {
         // an agent's obstacles can be anywhere
@@ -51,7 +51,7 @@ fn surround<T: Real>(sim: &Sim<T>, work: &Work<T>, broad: &Broad<T::Scalar>, geo
         GeomType::Mesh => half = [model.hull.map_or(T::lit(f64::INFINITY), |h| T::splat(sim.hulls[h].radius)); 3],
         GeomType::Plane | GeomType::Hfield => half = [T::lit(f64::INFINITY); 3],
     }
-    let mut center = work.contacts.centers[geom];
+    let mut center = work.contacts.places.centers[geom];
     if let Some(l) = mount.link {
         center = add3(&center, &work.motion.reference[sim.links[l].tree]);
     }

@@ -8,25 +8,39 @@ use crate::geometry::{Plane, first_tangent, pick, pick_axes};
 use crate::lanes::kernel_fn;
 use crate::model::GeomType;
 use crate::sim::{PairSpec, ShapePair, Sim};
-use crate::state::{Group, Work};
+use crate::state::{Group, RelativePose, Work, clearance};
 
 kernel_fn! {
-    /// Finds and writes the contacts of a pair of convex shapes, or of one with a plane or height field.
+    /// Finds and writes the contacts of a pair of convex shapes, or of one with a plane or height field. Returns a lower bound of the
+    /// distance beyond the margin of two convex shapes in the lanes where they are apart, elsewhere less than any distance.
     pub(super) fn touch_convex<'a, T>(
         sim: &'a Sim<T>,
         group: &'a Group<T>,
         work: &'a mut Work<T>,
         slots: &'a mut Slots<T>,
         candidate: &'a Candidate<T>,
-    ) {
+    ) -> T {
         let pair = &sim.contacts.pair(&sim.geoms, candidate.place.index);
         let [m, n] = [&sim.geoms[pair.geoms[0]], &sim.geoms[pair.geoms[1]]];
         let axes = [work.motion.axes(m), work.motion.axes(n)];
+        let mut distances = T::lit(f64::NEG_INFINITY);
+        let mut near = candidate.near;
+        let search = sim.contacts.search[candidate.place.index].filter(|_| sim.contacts.kept);
+        let seen = search.map(|i| (i as usize, RelativePose::new(&candidate.centers, &axes)));
+        if let Some((i, pose)) = &seen {
+            let left = work.contacts.places.left(*i, pose, T::splat(pair.radius));
+            let apart = T::zero().lt(clearance(left, T::splat(pair.reach)));
+            distances = T::select(apart, left, distances);
+            near = T::and(near, T::not(apart));
+            if !T::any(near) {
+                return distances;
+            }
+        }
         let mut found = std::mem::take(&mut work.contacts.touches);
         let contacts = &mut work.contacts;
         let (scratch, own) = (&mut contacts.convex, &mut contacts.lane_touches);
         found.clear();
-        let bits = T::bits(candidate.near);
+        let bits = T::bits(near);
         for lane in 0..T::LANES {
             if bits >> lane & 1 == 0 {
                 continue;
@@ -46,16 +60,22 @@ kernel_fn! {
                 }
                 _ => {
                     let first = Solid { center: a, axes: turned_a, form: form_of(pair, 0, &sim.hulls) };
-                    convex(&first, &second, pair.margin, &sim.search, scratch, own);
+                    if let Some(distance) = convex(&first, &second, pair.margin, &sim.search, scratch, own) {
+                        distances.set(lane, distance);
+                    }
                 }
             }
             gather(own, lane, &mut found);
+        }
+        if let Some((i, pose)) = &seen {
+            contacts.places.see(*i, near, pose, distances);
         }
         for touch in &mut found {
             touch.tangent = first_tangent(&touch.normal);
         }
         add_all(sim, group, work, slots, candidate.place, &found);
         work.contacts.touches = found;
+        distances
     }
 }
 

@@ -33,41 +33,51 @@ pub(crate) fn collide_pairs<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
     let few = sim.contacts.broad.is_none();
     for k in 0..count {
         let index = if few { k } else { work.contacts.sweep.found[k] as usize };
-        let pair = &sim.contacts.pair(&sim.geoms, index);
-        if few && work.contacts.clearances.apart(index, pair.geoms) {
+        let apart = if sim.contacts.kept { work.contacts.places.apart(sim, index) } else { T::none() };
+        if T::all(apart) {
             continue;
         }
+        let pair = &sim.contacts.pair(&sim.geoms, index);
+        // nothing is remembered of other pairs
+        let kept = sim.contacts.kept && pair.cull == Cull::Balls;
         slots.turn_to(pair.class(), work.rows.blocks.len());
         // everything relative to the reference point of one of the moving geoms' trees
         let base = pair.links[1].or(pair.links[0]).map_or(0, |l| sim.links[l].tree);
         let centers = [center(sim, work, pair.geoms[0], base), center(sim, work, pair.geoms[1], base)];
-        let (near, within) = (near(sim, group, work, pair, &centers), few && within_tree(sim, pair));
-        let clearance = if T::any(near) {
+        let near = T::and(near(sim, group, work, pair, &centers), T::not(apart));
+        let distance = if T::any(near) {
             let candidate = Candidate { place: Place { index, base }, centers, near };
             touch_pair(sim, group, work, &mut slots, &candidate)
-        } else if within {
-            let (d, reach) = (sub3(&centers[1], &centers[0]), T::splat(pair.reach));
-            Some(clearance(dot(&d, &d).sqrt() - reach, reach))
+        } else if kept {
+            Some(between_balls(pair, &centers))
         } else {
             None
         };
-        if let (Some(clearance), true) = (clearance, within) {
-            work.contacts.clearances.remember(index, pair.geoms, clearance);
+        if let (Some(distance), true) = (distance, kept) {
+            work.contacts.places.remember(sim, index, distance, T::splat(pair.reach));
         }
     }
 }
 
-/// Whether both geoms move and belong to one tree.
+/// Distance of the balls around two geoms, beyond the margin.
 #[inline(always)]
-fn within_tree<T: Real>(sim: &Sim<T>, pair: &GeomPairOf<T::Scalar>) -> bool {
-    matches!(pair.links, [Some(a), Some(b)] if sim.links[a].tree == sim.links[b].tree)
+fn between_balls<T: Real>(pair: &GeomPairOf<T::Scalar>, centers: &[V3<T>; 2]) -> T {
+    let d = sub3(&centers[1], &centers[0]);
+    dot(&d, &d).sqrt() - T::splat(pair.reach)
 }
 
 /// Centers and axes of the geoms in pairs, and how far they have moved.
 #[inline(always)]
 fn place_geoms<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
-    if !work.continues && sim.contacts.broad.is_none() {
-        work.contacts.clearances.forget();
+    let kept = sim.contacts.kept;
+    let places = &mut work.contacts.places;
+    if kept {
+        for (tree, reference) in work.motion.reference.iter().enumerate() {
+            places.refer(tree, reference);
+        }
+        for (i, link) in sim.contacts.turning.iter().enumerate() {
+            places.turn(i, &work.motion.rot[*link]);
+        }
     }
     for paired in &sim.contacts.paired {
         let (g, mount) = (paired.geom, &sim.geoms[paired.geom]);
@@ -75,12 +85,17 @@ fn place_geoms<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
             None => (splat3(&mount.pos), splat3(&mount.rot[2])),
             Some(l) => (work.motion.arm(mount, l), rotate(&work.motion.rot[l], &splat3(&mount.rot[2]))),
         };
-        if work.continues && sim.contacts.broad.is_none() {
-            let (shift, turn) = (sub3(&center, &work.contacts.centers[g]), sub3(&axis, &work.contacts.directions[g]));
-            work.contacts.clearances.follow(g, &shift, &turn, T::splat(paired.half));
+        if kept {
+            places.follow(g, &center, &axis, T::splat(paired.half));
+            if let Some((i, radius)) = paired.turning {
+                places.follow_turn(g, i, T::splat(radius));
+            }
+        } else {
+            places.put(g, &center, &axis);
         }
-        work.contacts.centers[g] = center;
-        work.contacts.directions[g] = axis;
+    }
+    if kept {
+        places.settle(sim);
     }
 }
 
@@ -95,7 +110,7 @@ fn near<T: Real>(
 ) -> T::Mask {
     let reach = T::splat(pair.reach);
     let mut point = centers[0];
-    let normal = work.contacts.directions[pair.geoms[0]];
+    let normal = work.contacts.places.directions[pair.geoms[0]];
     match pair.cull {
         Cull::Balls => geometry::near(&point, &centers[1], reach),
         Cull::Plane => plane::near_plane(&Plane { point, normal }, &centers[1], reach),
@@ -118,7 +133,7 @@ fn near<T: Real>(
 /// Center of a geom relative to the reference point of tree `base`.
 #[inline(always)]
 fn center<T: Real>(sim: &Sim<T>, work: &Work<T>, geom: usize, base: usize) -> V3<T> {
-    let own = &work.contacts.centers[geom];
+    let own = &work.contacts.places.centers[geom];
     match sim.geoms[geom].link.map(|l| sim.links[l].tree) {
         None => sub3(own, &work.motion.reference[base]),
         Some(t) if t == base => *own,
@@ -126,7 +141,7 @@ fn center<T: Real>(sim: &Sim<T>, work: &Work<T>, geom: usize, base: usize) -> V3
     }
 }
 
-/// Narrow phase of one pair. Returns its distance from touching, if known.
+/// Narrow phase of one pair. Returns a lower bound of its distance beyond the margin, if known.
 #[inline(always)]
 fn touch_pair<T: Real>(
     sim: &Sim<T>,
@@ -143,14 +158,13 @@ fn touch_pair<T: Real>(
     let mut known = None;
     if pair.round() {
         // few near pairs touch: the distance is cheaper than the contact point
-        let distance = round::gap(&capsule(work, a, ca, size_a), &capsule(work, b, cb, size_b));
-        let clearance = clearance(distance - margin, T::splat(pair.reach));
-        if !T::any(clearance.lt(T::zero())) {
-            return Some(clearance);
+        let distance = round::gap(&capsule(work, a, ca, size_a), &capsule(work, b, cb, size_b)) - margin;
+        if !T::any(clearance(distance, T::splat(pair.reach)).lt(T::zero())) {
+            return Some(distance);
         }
-        known = Some(clearance);
+        known = Some(distance);
     }
-    let [first_axis, axis] = [work.contacts.directions[a], work.contacts.directions[b]];
+    let [first_axis, axis] = [work.contacts.places.directions[a], work.contacts.places.directions[b]];
     let first_sphere = Sphere { center: ca, axis: first_axis, radius: size_a[0] };
     let sphere = Sphere { center: cb, axis, radius: size_b[0] };
     let ground = Plane { point: ca, normal: first_axis };
@@ -176,8 +190,9 @@ fn touch_pair<T: Real>(
             return None;
         }
         ShapePair::PlaneHull | ShapePair::Convex | ShapePair::FieldConvex => {
-            touch_convex(sim, group, work, slots, candidate);
-            return None;
+            let known = work.contacts.places.known(sim, candidate.place.index);
+            let distance = touch_convex(sim, group, work, slots, candidate);
+            return Some(distance.max(between_balls(pair, &candidate.centers)).max(known));
         }
         ShapePair::Obstacles => {
             touch_obstacles(sim, group, work, slots, candidate);
@@ -185,7 +200,7 @@ fn touch_pair<T: Real>(
         }
         ShapePair::CapsuleBox | ShapePair::BoxBox | ShapePair::FieldBox => {
             one_by_one(sim, group, work, slots, candidate);
-            return None;
+            return Some(between_balls(pair, &candidate.centers));
         }
     };
     add_all(sim, group, work, slots, candidate.place, found);
@@ -194,7 +209,7 @@ fn touch_pair<T: Real>(
 
 #[inline(always)]
 fn capsule<T: Real>(work: &Work<T>, geom: usize, center: V3<T>, size: V3<T>) -> Capsule<T> {
-    Capsule { center, axis: work.contacts.directions[geom], radius: size[0], half: size[1] }
+    Capsule { center, axis: work.contacts.places.directions[geom], radius: size[0], half: size[1] }
 }
 
 #[inline(always)]

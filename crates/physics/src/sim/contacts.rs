@@ -8,7 +8,7 @@ use super::contact_params::{ContactParams, declared, label, may_collide};
 use super::floor_points::{self, FloorPoint};
 use super::link::Mount;
 use super::options::{SimError, SimOptions};
-use super::pairs::{self, GeomPair, GeomPairOf, PairSpec, Paired};
+use super::pairs::{self, Cull, GeomPair, GeomPairOf, PairSpec, Paired, ShapePair};
 use super::weld::BodyMount;
 use crate::budget::{MEMORY, OverBudget};
 use crate::lanes::Real;
@@ -26,6 +26,16 @@ pub(crate) struct Contacts<C> {
     pub specs: Vec<PairSpec<C>>,
     /// Geoms of those pairs.
     pub paired: Vec<Paired<C>>,
+    /// Whether each group [keeps](crate::state::GeomPlaces) the distances of pairs.
+    pub kept: bool,
+    /// Least [reach](PairSpec::reach) of two geoms that balls bound.
+    pub least_reach: C,
+    /// Per pair: its number among those of convex shapes of which a group keeps poses.
+    pub search: Vec<Option<u32>>,
+    /// Number of these.
+    pub searches: usize,
+    /// Links of which such a geom is [turning](Paired::turning).
+    pub turning: Vec<usize>,
     /// Whether some are [hard](super::weights::is_hard).
     pub hard: bool,
     /// The broad phase of those pairs, if they are many.
@@ -39,6 +49,25 @@ const PAIR: usize = 4 * size_of::<GeomPair>();
 /// Number of pairs between two checks of the memory.
 const LOOK: usize = 1 << 16;
 
+impl<C: Real> Contacts<C> {
+    /// No contacts.
+    pub fn none() -> Self {
+        Contacts {
+            floor: Vec::new(),
+            pairs: Vec::new(),
+            specs: Vec::new(),
+            paired: Vec::new(),
+            kept: false,
+            least_reach: C::zero(),
+            search: Vec::new(),
+            searches: 0,
+            turning: Vec::new(),
+            hard: false,
+            broad: None,
+        }
+    }
+}
+
 impl<C> Contacts<C> {
     /// Checks the memory of the lists against the limit, once per `LOOK` pairs.
     fn check(&self) -> Result<(), OverBudget> {
@@ -48,24 +77,13 @@ impl<C> Contacts<C> {
         }
     }
 
-    /// No contacts.
-    pub fn none() -> Self {
-        Contacts {
-            floor: Vec::new(),
-            pairs: Vec::new(),
-            specs: Vec::new(),
-            paired: Vec::new(),
-            hard: false,
-            broad: None,
-        }
-    }
-
     /// A pair by its index.
     #[inline(always)]
     pub fn pair<'a>(&'a self, geoms: &[Mount<C>], index: usize) -> GeomPairOf<'a, C> {
         let pair = &self.pairs[index];
         let ends = pair.geoms.map(|g| g as usize);
-        GeomPairOf { geoms: ends, links: ends.map(|g| geoms[g].link), spec: &self.specs[pair.spec as usize] }
+        let spec = &self.specs[pair.spec as usize];
+        GeomPairOf { geoms: ends, links: ends.map(|g| geoms[g].link), spec }
     }
 }
 
@@ -118,9 +136,11 @@ pub(super) fn contacts<T: Real>(
             let (a, b) = if rank(model.geoms[i].kind) <= rank(model.geoms[j].kind) { (i, j) } else { (j, i) };
             let (a, b) = if model.obstacles == Some(b) { (b, a) } else { (a, b) };
             let geoms = [a as u32, b as u32];
+            let tree = |g: usize| link(g).map(|l| tree_of[l]);
+            let across = tree(a) != tree(b);
             out.check().map_err(|over| SimError::Budget { model: model.name.clone(), over })?;
             if let (None, Some(spec)) = (declared, known.get(&[kinds[a], kinds[b]])) {
-                out.pairs.push(GeomPair { geoms, spec: *spec });
+                out.pairs.push(GeomPair { geoms, spec: *spec, across });
                 continue;
             }
             let declarations = declared.map_or(vec![None], |numbers| numbers.iter().copied().map(Some).collect());
@@ -145,7 +165,7 @@ pub(super) fn contacts<T: Real>(
                         "remove the flag: libccd, which it selects, finds other contacts",
                     );
                 }
-                out.pairs.push(GeomPair { geoms, spec });
+                out.pairs.push(GeomPair { geoms, spec, across });
                 if number.is_none() {
                     known.insert([kinds[a], kinds[b]], spec);
                 }
@@ -158,13 +178,53 @@ pub(super) fn contacts<T: Real>(
     out.pairs.sort_by_key(|p| out.specs[p.spec as usize].class());
     let mut meets = vec![false; model.geoms.len()];
     out.pairs.iter().flat_map(|p| p.geoms).for_each(|g| meets[g as usize] = true);
-    let paired = (0..meets.len()).filter(|g| meets[*g]);
-    let half = |g: &Geom| if g.kind == GeomType::Capsule { g.size[1] } else { 0.0 };
-    out.paired = paired.map(|g| Paired { geom: g, half: T::scalar(half(&model.geoms[g])) }).collect();
+    list_geoms::<T>(model, &meets, link, &mut out);
     let group = |g: usize| link(g).map(|l| tree_of[l]);
     out.broad = Broad::of(&out.paired, &out.pairs, &out.specs, tree_of.iter().max().map_or(0, |t| t + 1), group);
+    out.kept = out.broad.is_none() && out.pairs.len() <= MOST_KEPT;
+    let balls = out.specs.iter().filter(|spec| spec.cull == Cull::Balls);
+    out.least_reach = balls.fold(T::scalar(f64::INFINITY), |least, spec| spec.reach.min(least));
     Ok(out)
 }
+
+/// Lists the geoms of pairs, and the links whose turns matter.
+fn list_geoms<T: Real>(
+    model: &Model,
+    meets: &[bool],
+    link: impl Fn(usize) -> Option<usize>,
+    out: &mut Contacts<T::Scalar>,
+) {
+    let mut whole = vec![false; model.geoms.len()];
+    for pair in &out.pairs {
+        let convex = out.specs[pair.spec as usize].shapes == ShapePair::Convex;
+        if convex {
+            pair.geoms.iter().for_each(|g| whole[*g as usize] = true);
+        }
+        let seen = convex && out.searches < MOST_SEEN;
+        out.search.push(seen.then_some(out.searches as u32));
+        out.searches += usize::from(seen);
+    }
+    for g in (0..meets.len()).filter(|g| meets[*g]) {
+        let geom = &model.geoms[g];
+        let half = if geom.kind == GeomType::Capsule { geom.size[1] } else { 0.0 };
+        let turning = match link(g) {
+            Some(l) if whole[g] && !matches!(geom.kind, GeomType::Capsule | GeomType::Sphere) => {
+                let known = out.turning.iter().position(|x| *x == l);
+                let i = known.unwrap_or_else(|| {
+                    out.turning.push(l);
+                    out.turning.len() - 1
+                });
+                Some((i, T::scalar(pairs::radius(model, geom))))
+            }
+            _ => None,
+        };
+        out.paired.push(Paired { geom: g, half: T::scalar(half), turning });
+    }
+}
+
+/// Largest number of pairs whose distances, and of pairs of convex shapes whose poses are kept: every group has memory for them.
+const MOST_KEPT: usize = 1 << 14;
+const MOST_SEEN: usize = 1 << 11;
 
 /// Number of geoms from which a model counts as a crowd.
 const CROWD: usize = 200;

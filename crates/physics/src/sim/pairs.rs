@@ -88,6 +88,16 @@ pub(crate) struct GeomPair {
     pub geoms: [u32; 2],
     /// Index of its [`PairSpec`].
     pub spec: u32,
+    /// Whether they belong to different trees, or one is static.
+    pub across: bool,
+}
+
+/// Radius of the ball around a geom's center that holds the geom.
+pub(super) fn radius(model: &Model, geom: &Geom) -> f64 {
+    match geom.hull {
+        Some(hull) => hull_radius(&model.hulls[hull]),
+        None => bounding_radius(geom.kind, &geom.size),
+    }
 }
 
 /// A geom that is part of pairs.
@@ -96,6 +106,9 @@ pub(crate) struct Paired<C> {
     pub geom: usize,
     /// Half length of a capsule along the third axis. Other geoms have 0, and a ball bounds them.
     pub half: C,
+    /// Of a geom whose whole shape counts in a pair, and which is not round: the number of its link among those whose turns matter,
+    /// and its radius.
+    pub turning: Option<(usize, C)>,
 }
 
 /// A pair with its data.
@@ -124,6 +137,8 @@ pub(crate) struct PairSpec<C> {
     pub cull: Cull,
     /// Distance beyond which they cannot touch: of the centers, or of the second's center from the plane.
     pub reach: C,
+    /// Radius of the second geom around its center.
+    pub radius: C,
     pub margin: C,
     pub dim: usize,
     pub cost: Cost,
@@ -209,10 +224,6 @@ pub(super) fn add<T: Real>(
         _ if obstacles => Cull::Obstacles,
         _ => Cull::Balls,
     };
-    let radius = |g: &Geom| match g.hull {
-        Some(hull) => hull_radius(&model.hulls[hull]),
-        None => bounding_radius(g.kind, &g.size),
-    };
     let sizes = |g: &Geom| if g.kind == GeomType::Sphere { [g.size[0], 0.0, 0.0] } else { g.size };
     *hard |= is_hard(model, mounts, [a.body, b.body], diag);
     specs.push(PairSpec {
@@ -224,7 +235,8 @@ pub(super) fn add<T: Real>(
         hulls: [a, b].map(|g| g.hull.unwrap_or(0)),
         field: a.hfield.unwrap_or(0),
         cull,
-        reach: c(if cull == Cull::Balls { radius(a) } else { 0.0 } + radius(b) + params.margin),
+        radius: c(radius(model, b)),
+        reach: c(if cull == Cull::Balls { radius(model, a) } else { 0.0 } + radius(model, b) + params.margin),
         margin: c(params.margin),
         dim: params.condim,
         cost,

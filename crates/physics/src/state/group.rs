@@ -1,5 +1,7 @@
 //! State of a lane group.
 
+use super::clearance::GeomPlaces;
+use super::scratch::Work;
 use super::solids::Solids;
 use crate::algebra::spatial::{V3, V6};
 use crate::geometry::height::HeightField;
@@ -32,6 +34,8 @@ pub struct Group<T: Real> {
     pub(crate) grounds: Vec<Option<Arc<HeightField<T::Scalar>>>>,
     /// Obstacles of agents that have some.
     pub(crate) obstacles: Option<Box<Solids<T>>>,
+    /// Places of the geoms at the last evaluation of the forces, which save work and change nothing.
+    pub(crate) places: GeomPlaces<T>,
 }
 
 /// An agent's own constants in place of the model's.
@@ -59,7 +63,23 @@ impl<T: Real> Group<T> {
             varied: None,
             grounds: Vec::new(),
             obstacles: None,
+            places: GeomPlaces::none(),
             qacc_warmstart: vec![zero; m.nv],
+        }
+    }
+
+    /// Memory of what a group of this model keeps for one agent besides its state, bytes.
+    pub fn kept_bytes(sim: &Sim<T>) -> usize {
+        GeomPlaces::bytes(sim)
+    }
+
+    /// Exchanges the group's places of geoms with those in scratch memory.
+    pub(crate) fn swap_places(&mut self, sim: &Sim<T>, work: &mut Work<T>) {
+        if sim.contacts.kept {
+            if !self.places.fit(sim) {
+                self.places = GeomPlaces::new(sim);
+            }
+            std::mem::swap(&mut self.places, &mut work.contacts.places);
         }
     }
 

@@ -13,7 +13,7 @@ mod sweep;
 mod variation;
 
 pub use agent::AgentState;
-pub(crate) use clearance::clearance;
+pub(crate) use clearance::{RelativePose, clearance};
 pub(crate) use coupling::Coupling;
 pub use group::Group;
 pub use obstacle::{Obstacle, ObstacleShape};

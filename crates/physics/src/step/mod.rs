@@ -33,6 +33,7 @@ impl<T: Real> Sim<T> {
             *touched = T::none();
         }
         work.continues = false;
+        group.swap_places(self, work);
         for _ in 0..substeps {
             if self.rk4 {
                 self.rk4(work, group);
@@ -42,6 +43,7 @@ impl<T: Real> Sim<T> {
             }
             group.move_obstacles(self.dt);
         }
+        group.swap_places(self, work);
     }
 
     /// The end of a step after [`Sim::forward`], by [`euler`] or [`implicitfast`].

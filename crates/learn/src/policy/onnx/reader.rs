@@ -303,6 +303,7 @@ mod tests {
 
     /// Many tensors refer to the same numbers in an external file.
     #[test]
+    #[cfg_attr(target_family = "wasm", ignore = "needs a folder for temporary files")]
     fn neighbors_may_not_multiply_memory() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("w.data"), vec![0; 1 << 20]).unwrap();

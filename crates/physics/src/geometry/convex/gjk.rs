@@ -23,6 +23,9 @@ pub(super) struct Vertex<S> {
 /// Largest cap of a search's iterations.
 pub(crate) const MOST_ITERATIONS: usize = 1000;
 
+/// Least ratio of the bound to the distance with which a search for a distance that is too large ends.
+const ENOUGH: f64 = 0.7;
+
 /// Settings of a search.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Search<S> {
@@ -73,8 +76,13 @@ pub(super) fn is_single<S: Number>() -> bool {
     S::EPSILON > 1e-12
 }
 
-/// Finds the distance of two shapes. `None` if they are farther apart than `cutoff`, or than 0 without one.
-pub(super) fn nearest<S: Number>(couple: &mut Couple<S>, search: &Search<S>, cutoff: Option<S>) -> Option<Nearest<S>> {
+/// Finds the distance of two shapes. If they are farther apart than `cutoff`, or than 0 without one, the error is a lower bound of the
+/// distance.
+pub(super) fn nearest<S: Number>(
+    couple: &mut Couple<S>,
+    search: &Search<S>,
+    cutoff: Option<S>,
+) -> Result<Nearest<S>, S> {
     let zero = S::zero();
     let discrete = couple.is_discrete();
     let floor = S::lit(if is_single::<S>() { 8.0 * S::EPSILON } else { TINY });
@@ -87,6 +95,8 @@ pub(super) fn nearest<S: Number>(couple: &mut Couple<S>, search: &Search<S>, cut
     let mut simplex = [vertex; 4];
     let mut weights = [S::lit(1.0), zero, zero, zero];
     let mut count = 0;
+    // of the distance, once it is known to be too large
+    let mut bound = zero;
     for _ in 0..search.iterations {
         let square = dot(&x, &x);
         let start = count == 0;
@@ -106,7 +116,11 @@ pub(super) fn nearest<S: Number>(couple: &mut Couple<S>, search: &Search<S>, cut
             }
             let far = cutoff.is_none_or(|cutoff| !(lower < cutoff * length));
             if zero < lower && far {
-                return None;
+                bound = bound.max(lower.div(length));
+            }
+            // a bound near the distance saves searches in later steps
+            if zero < bound && !(lower < S::lit(ENOUGH) * square) {
+                break;
             }
         }
         simplex[count] = new;
@@ -121,12 +135,15 @@ pub(super) fn nearest<S: Number>(couple: &mut Couple<S>, search: &Search<S>, cut
             break;
         }
     }
+    if zero < bound {
+        return Err(bound);
+    }
     let distance = if count == 4 { zero } else { norm(&x) };
     let mut found = Nearest { distance, witness, simplex, count };
     if count > 0 {
         found.witness = [0, 1].map(|side| mix(&simplex, &weights, count, |v| &v.on[side]));
     }
-    if cutoff.is_none() && is_separated(couple, search, &mut found, &x) { None } else { Some(found) }
+    if cutoff.is_none() && is_separated(couple, search, &mut found, &x) { Err(zero) } else { Ok(found) }
 }
 
 /// Near the surface, and where rounding has stopped the search, the side of the support plane decides whether two shapes

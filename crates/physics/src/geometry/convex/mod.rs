@@ -33,7 +33,8 @@ use super::{Plane, Rot, Touch, Touches, V3};
 use manifold::Contact;
 use pair::{Pair, have_faces};
 
-/// Finds the contacts of two shapes, in the order of MuJoCo's shape types, and appends them. The tangents are left out.
+/// Finds the contacts of two shapes, in the order of MuJoCo's shape types, and appends them. The tangents are left out. Returns a lower
+/// bound of the distance beyond the margin if the shapes are apart.
 // one copy per precision, for all lane types
 #[inline(never)]
 pub(crate) fn convex<S: Number>(
@@ -43,9 +44,9 @@ pub(crate) fn convex<S: Number>(
     search: &Search<S>,
     scratch: &mut Scratch<S>,
     out: &mut Touches<S>,
-) {
+) -> Option<S> {
     let pair = Pair { solids: [a, b], margin, several: search.several && have_faces(a, b), search };
-    pair.contacts(scratch, |contact| push(out, &contact, margin));
+    pair.contacts(scratch, |contact| push(out, &contact, margin))
 }
 
 /// Finds the contacts of a plane and a hull and appends them. The tangents are left out.

@@ -44,42 +44,47 @@ struct Closest<S> {
 }
 
 impl<'b, S: Number> Pair<'_, 'b, S> {
-    /// Finds the contacts.
-    pub(super) fn contacts(&self, scratch: &mut Scratch<S>, mut add: impl FnMut(Contact<S>)) {
-        let Some(closest) = self.closest(&mut scratch.polytope) else { return };
+    /// Finds the contacts. Without contacts, returns a lower bound of the distance beyond the margin.
+    pub(super) fn contacts(&self, scratch: &mut Scratch<S>, mut add: impl FnMut(Contact<S>)) -> Option<S> {
+        let closest = match self.closest(&mut scratch.polytope) {
+            Ok(closest) => closest,
+            Err(distance) => return Some(distance),
+        };
         let Closest { dist, witness, vertices } = &closest;
         if self.several && scratch.polygons.contacts(self.solids, vertices, witness, self.margin, &mut add) {
-            return;
+            return None;
         }
         let normal = unit(&sub(&witness[0], &witness[1]));
         add(Contact { dist: *dist + self.margin, pos: middle(&witness[0], &witness[1]), normal });
+        None
     }
 
-    /// The shapes without radii and margin are enough if they are apart. Otherwise the whole shapes overlap.
-    fn closest(&self, polytope: &mut Polytope<S>) -> Option<Closest<S>> {
+    /// The shapes without radii and margin are enough if they are apart. Otherwise the whole shapes overlap. If there is no contact, the
+    /// error is a lower bound of the distance beyond the margin.
+    fn closest(&self, polytope: &mut Polytope<S>) -> Result<Closest<S>, S> {
         let zero = S::zero();
         let half = S::lit(0.5) * self.margin;
         let radii = self.solids.map(|s| s.radius().unwrap_or(zero) + half);
         let reach = radii[0] + radii[1];
         if zero < reach {
-            let found = nearest(&mut self.couple(true, zero), self.search, Some(reach))?;
+            let found = nearest(&mut self.couple(true, zero), self.search, Some(reach)).map_err(|far| far - reach)?;
             if self.least_line() < found.distance {
                 let line = unit(&sub(&found.witness[1], &found.witness[0]));
                 let witness = [along(&found.witness[0], &line, radii[0]), along(&found.witness[1], &line, -radii[1])];
                 let corner = |i: usize| found.simplex[if i < found.count { i } else { 0 }];
                 let found =
                     Closest { dist: found.distance - reach, witness, vertices: [corner(0), corner(1), corner(2)] };
-                return (found.dist < zero).then_some(found);
+                return if found.dist < zero { Ok(found) } else { Err(zero) };
             }
         }
         let mut couple = self.couple(false, half);
         let found = nearest(&mut couple, self.search, None)?;
         if zero < found.distance || found.count < 2 {
-            return None;
+            // a search that ends before its tolerance finds too long a distance
+            return Err(zero);
         }
-        let found = depth(&mut couple, self.search, &found, polytope)?;
-        let Depth { depth, witness, vertices } = found;
-        (zero < depth).then_some(Closest { dist: -depth, witness, vertices })
+        let Depth { depth, witness, vertices } = depth(&mut couple, self.search, &found, polytope).ok_or(zero)?;
+        if zero < depth { Ok(Closest { dist: -depth, witness, vertices }) } else { Err(zero) }
     }
 
     /// The shapes for a search: spheres and capsules shrunk to points and segments, or all shapes inflated.

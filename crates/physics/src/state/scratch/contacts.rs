@@ -1,11 +1,10 @@
 //! Positions of geoms, and their contacts.
 
-use crate::algebra::spatial::V3;
 use crate::geometry::field_capsule::Gaps;
 use crate::geometry::{Touch, Touches, convex};
 use crate::lanes::Real;
 use crate::sim::Sim;
-use crate::state::clearance::Clearances;
+use crate::state::clearance::GeomPlaces;
 use crate::state::sweep::Sweep;
 
 /// Positions of geoms, and their contacts.
@@ -19,11 +18,8 @@ pub(crate) struct GeomContacts<T: Real> {
     pub normal_force: Vec<T>,
     /// Per geom: lanes that touch another moving geom at the last physics step.
     pub touching_bodies: Vec<T::Mask>,
-    /// Centers of the geoms in pairs, relative to their trees' reference points; for static geoms, in the world.
-    pub centers: Vec<V3<T>>,
-    /// Their third axes: a plane's normal, a capsule's direction.
-    pub directions: Vec<V3<T>>,
-    pub clearances: Clearances<T>,
+    /// Places of the geoms in pairs, of the group that is evaluated.
+    pub places: GeomPlaces<T>,
     /// Pairs that may touch, if the broad phase is used.
     pub sweep: Sweep<T::Scalar>,
     /// Contacts of one pair of geoms, and of one lane of them.
@@ -47,12 +43,7 @@ impl<T: Real> GeomContacts<T> {
             ground_contacts: vec![z; sim.geoms.len()],
             normal_force: vec![z; sim.geoms.len()],
             touching_bodies: vec![T::none(); sim.geoms.len()],
-            centers: vec![[z; 3]; sim.geoms.len()],
-            directions: vec![[z; 3]; sim.geoms.len()],
-            clearances: match sim.contacts.broad {
-                None => Clearances::new(sim.geoms.len(), sim.contacts.pairs.len()),
-                Some(_) => Clearances::new(0, 0),
-            },
+            places: GeomPlaces::new(sim),
             sweep: Sweep::new(if sim.contacts.broad.is_some() { sim.geoms.len() } else { 0 }),
             touches: Vec::new(),
             lane_touches: Touches::new(),

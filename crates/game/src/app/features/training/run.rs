@@ -71,7 +71,7 @@ pub struct TrainingRun {
 /// # Errors
 /// If the options make no sense, or the file is no configuration for the agent.
 pub fn settings(task_config: &TaskConfig, options: &TrainingOptions) -> Result<TrainConfig, RunError> {
-    let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
+    let cores = marathon_physics::threads(0);
     let threads = options.learn.threads.unwrap_or(cores.saturating_sub(1).max(1));
     let learn = LearnOptions { seed: Some(options.seed), threads: Some(threads), ..options.learn.clone() };
     let run = RunOptions { learn, ..Default::default() };
