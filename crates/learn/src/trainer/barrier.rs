@@ -120,6 +120,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(target_family = "wasm", ignore = "needs threads")]
     fn a_panic_frees_the_others() {
         let barrier = Barrier::new(2);
         let outcome = std::panic::catch_unwind(|| {
