@@ -99,6 +99,7 @@ mod tests {
     use super::*;
 
     #[test]
+    #[cfg_attr(target_family = "wasm", ignore = "needs threads")]
     fn threads_stay_in_step() {
         let (barrier, counter) = (Barrier::new(3), AtomicUsize::new(0));
         std::thread::scope(|s| {
