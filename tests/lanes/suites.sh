@@ -24,10 +24,7 @@ for suite in "${suites[@]}"; do
   case "$suite" in
     wasm)
       rustup --quiet target add wasm32-wasip1
-      # Node 20 has relaxed vectors behind a flag that later ones do not know
-      flag=--experimental-wasm-relaxed-simd
-      node "$flag" --eval '' 2> /dev/null || flag=''
-      CARGO_TARGET_WASM32_WASIP1_RUNNER="node --no-warnings $flag $PWD/tests/lanes/wasi.mjs" RUSTFLAGS='-C target-feature=+simd128' \
+      CARGO_TARGET_WASM32_WASIP1_RUNNER="node --no-warnings $PWD/tests/lanes/wasi.mjs" RUSTFLAGS='-C target-feature=+simd128' \
         cargo test --release --no-fail-fast --target wasm32-wasip1 --lib --tests "${packages[@]}" "$@"
       ;;
     aarch64)

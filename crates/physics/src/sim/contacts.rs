@@ -26,7 +26,7 @@ pub(crate) struct Contacts<C> {
     pub specs: Vec<PairSpec<C>>,
     /// Geoms of those pairs.
     pub paired: Vec<Paired<C>>,
-    /// Whether each group [keeps](crate::state::GeomPlaces) the distances of pairs.
+    /// Whether each group [keeps](crate::state::Group) the distances of pairs.
     pub kept: bool,
     /// Least [reach](PairSpec::reach) of two geoms that balls bound.
     pub least_reach: C,
@@ -181,7 +181,7 @@ pub(super) fn contacts<T: Real>(
     list_geoms::<T>(model, &meets, link, &mut out);
     let group = |g: usize| link(g).map(|l| tree_of[l]);
     out.broad = Broad::of(&out.paired, &out.pairs, &out.specs, tree_of.iter().max().map_or(0, |t| t + 1), group);
-    out.kept = out.broad.is_none() && out.pairs.len() <= MOST_KEPT;
+    out.kept = out.broad.is_none() && (1..=MOST_KEPT).contains(&out.pairs.len());
     let balls = out.specs.iter().filter(|spec| spec.cull == Cull::Balls);
     out.least_reach = balls.fold(T::scalar(f64::INFINITY), |least, spec| spec.reach.min(least));
     Ok(out)

@@ -169,7 +169,7 @@ impl<T: Real> GeomPlaces<T> {
     }
 
     /// Sum of the movements of the trees of two geoms.
-    #[inline(never)]
+    #[inline(always)]
     fn shift(&self, sim: &Sim<T>, geoms: [usize; 2]) -> T {
         let links = geoms.into_iter().filter_map(|g| sim.geoms[g].link);
         links.fold(T::zero(), |sum, link| sum + self.shifts[sim.links[link].tree])
