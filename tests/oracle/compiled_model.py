@@ -118,6 +118,7 @@ def dof(m, i):
         "body": m.dof_bodyid[i], "joint": m.dof_jntid[i],
         "parent": m.dof_parentid[i] if m.dof_parentid[i] >= 0 else "none", "armature": m.dof_armature[i] + armature,
         "damping": m.dof_damping[i] + damping, "damping_poly": m.dof_dampingpoly[i] + poly, "frictionloss": m.dof_frictionloss[i],
+        "geared": m.jnt_actuatorid[m.dof_jntid[i]] != -1,
         "solref_friction": m.dof_solref[i], "solimp_friction": m.dof_solimp[i], "invweight0": m.dof_invweight0[i],
     }
 

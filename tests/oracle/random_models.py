@@ -10,7 +10,8 @@ and prints a line of JSON per model:
      "states": [..], "skipped": draws that were left out}
 or, where MuJoCo does not compile the model, {"seed": s, "xml": text, "error": why}. A seed's model does not depend on
 the others. States are such that MuJoCo's answer is well defined, as in foreign_models.py; "single" tells whether it is
-so for the rounding of single precision too, "weightless" that it is not so of what constraints do.
+so for the rounding of single precision too, "noisy" of which sensor values it is not so, "weightless" that it is not so of
+what constraints do.
 
 With {"judge": [{"seed": s, "state": index, "states": as above, "qacc": [..]}]} instead, prints per entry how far from the
 minimum of MuJoCo's own problem both accelerations are: {"ours": .., "mujoco": ..}, as norms of the gradient relative to
@@ -32,6 +33,8 @@ from model_generator import Generator, random_model, with_keyframe
 # by how much positions are moved to see what rounding does to the answer, and by how much the answer may change then
 NUDGE, CHANGE = 1e-9, 1e-4
 SINGLE_NUDGE, SINGLE_CHANGE = 2e-7, 2e-3
+# a change of positions that only makes double precision round otherwise; how much coarser single precision rounds
+LAST_DIGIT, COARSER = 2e-16, 2.0**29
 # draws per state that is asked for
 PATIENCE = 8
 
@@ -145,6 +148,14 @@ def answer(model, data, state, rng):
     if changes(NUDGE) > CHANGE:
         return "ill-conditioned"
     single = all(changes(SINGLE_NUDGE) < SINGLE_CHANGE for _ in range(3))
+    # single precision rounds within the step, too: forces that cancel leave nothing of its digits
+    noises, own = [], np.random.default_rng(0)
+    for _ in range(4):
+        nudged = moved(model, state, own, LAST_DIGIT)
+        if not converges(model.opt):
+            single &= COARSER * relative(step(model, data, nudged), after) < SINGLE_CHANGE
+        forward(model, data, nudged)
+        noises.append(data.sensordata.copy())
     sensors = []
     for by in [NUDGE, -NUDGE]:
         shifted = mujoco.MjModel.__copy__(model)
@@ -159,6 +170,8 @@ def answer(model, data, state, rng):
         sensors.append(data.sensordata.copy())
     forward(model, data, state)
     mujoco.mj_rnePostConstraint(model, data)
+    noise = COARSER * np.max(np.abs(noises - data.sensordata), axis=0)
+    noisy = noise > SINGLE_CHANGE * (1 + np.abs(data.sensordata))
     jumps = [np.abs(s - data.sensordata) > CHANGE * (1 + np.abs(s)) for s in sensors]
     if any(c.exclude for c in data.contact):
         # contacts without force are counted by MuJoCo's sensors and not by ours
@@ -176,6 +189,7 @@ def answer(model, data, state, rng):
         "xpos": data.xpos.ravel(), "geom_xpos": data.geom_xpos.ravel(),
         "sensordata": [None if jump else x for x, jump in zip(data.sensordata.tolist(), np.any(jumps, axis=0))],
         "next_qpos": after[:nq], "next_qvel": after[nq : nq + nv], "next_act": after[nq + nv :],
+        "noisy": noisy,
     }
 
 

@@ -109,7 +109,8 @@ fn bounded<T: Real>(
     (force, slope)
 }
 
-/// Factors that bring the sums of the actuator forces on tendons into their bounds.
+/// Factors that bring the sums of the actuator forces on tendons into their bounds, and whether the sums change with the
+/// velocity.
 #[inline(always)]
 fn share_tendons<T: Real>(sim: &Sim<T>, group: &Group<T>, forces: &mut Forces<T>) {
     let one = T::lit(1.0);
@@ -122,9 +123,15 @@ fn share_tendons<T: Real>(sim: &Sim<T>, group: &Group<T>, forces: &mut Forces<T>
         let (below, above) = (sum.lt(low), high.lt(sum));
         let outside = T::or(below, above);
         let share = T::select(below, low, high).div(T::select(outside, sum, one));
-        // a sum at its bound does not change with the velocity
-        let free = T::masked(T::and(low.lt(sum), sum.lt(high)), one);
-        forces.tendon_share[range.tendon] = [T::select(outside, share, one), free];
+        let share = T::select(outside, share, one);
+        // a sum at its bound or beyond does not change with the velocity, and the actuators' own bounds may move it there
+        let mut bounded_sum = T::select(below, low, sum.min(high));
+        for i in &range.actuators {
+            let force = force_and_slope(group, forces, *i, &sim.actuators[*i]).0 * share;
+            bounded_sum += clamp(force, sim.actuators[*i].force) - force;
+        }
+        let free = T::masked(T::and(low.lt(bounded_sum), bounded_sum.lt(high)), one);
+        forces.tendon_share[range.tendon] = [share, free];
     }
 }
 

@@ -179,6 +179,7 @@ fn reflect(attrs: &Attrs, actuator: &Actuator, model: &mut Model) -> Result<(), 
     if armature < 0.0 {
         return Err(attrs.element.invalid("armature must not be negative"));
     }
+    let given = [("damping", damping != 0.0 || damping_poly != [0.0; 2]), ("armature", armature != 0.0)];
     let square = actuator.gear[0] * actuator.gear[0];
     let add = |to: (&mut f64, &mut f64, &mut [f64; 2])| {
         *to.0 += armature * square;
@@ -190,6 +191,7 @@ fn reflect(attrs: &Attrs, actuator: &Actuator, model: &mut Model) -> Result<(), 
             let joint = &model.joints[j];
             for dof in &mut model.dofs[joint.dof_adr..joint.dof_adr + joint.kind.dofs()] {
                 add((&mut dof.armature, &mut dof.damping, &mut dof.damping_poly));
+                dof.geared |= given.iter().any(|(_, given)| *given);
             }
         }
         Transmission::Tendon(t) => {
@@ -197,7 +199,6 @@ fn reflect(attrs: &Attrs, actuator: &Actuator, model: &mut Model) -> Result<(), 
             add((&mut tendon.armature, &mut tendon.damping, &mut tendon.damping_poly));
         }
         Transmission::Site { .. } | Transmission::SliderCrank { .. } | Transmission::Body(_) => {
-            let given = [("damping", damping != 0.0 || damping_poly != [0.0; 2]), ("armature", armature != 0.0)];
             if let Some((name, _)) = given.iter().find(|(_, given)| *given) {
                 return Err(attrs.element.invalid(format!("'{name}' needs a joint or a tendon")));
             }

@@ -296,6 +296,7 @@ fn add_joint(model: &mut Model, body: usize, spec: &JointSpec) {
             armature: spec.armature,
             damping: spec.damping.0,
             damping_poly: spec.damping.1,
+            geared: false,
             frictionloss: spec.frictionloss,
             solref_friction: spec.solref_friction,
             solimp_friction: spec.solimp_friction,

@@ -349,6 +349,9 @@ pub struct Dof {
     /// Higher orders of the damping (MuJoCo `dof_dampingpoly`): at the velocity `v` the damping is
     /// `damping + poly[0] |v| + poly[1] v^2`.
     pub damping_poly: [f64; 2],
+    /// Whether an actuator adds armature or damping. Euler's method then takes the damping at the end of the step, even if it
+    /// is zero. That matters if a low cap ends the solver before the forces match the accelerations.
+    pub geared: bool,
     /// Dry friction, N or N m.
     pub frictionloss: f64,
     /// `solreffriction` for the dry friction.

@@ -153,7 +153,8 @@ impl<T: Real> Sim<T> {
         let places = string::Mounts { sites: &sites, geoms: &geoms, trees: &tree_of };
         let (strings, drives) = (string::strings::<T>(model, &places), drive::drives::<T>(model, &places));
         let contacts = contacts::contacts::<T>(model, &mounts, &link_of, &tree_of, &options)?;
-        let damped = flags.damper && model.dofs.iter().any(|d| d.damping != 0.0);
+        let capped = Caps::new(model, &options);
+        let damped = flags.damper && model.dofs.iter().any(|d| d.damping != 0.0 || capped.is_some() && d.geared);
         let implicit_fast = matches!(model.opt.integrator, Integrator::Implicit | Integrator::ImplicitFast);
         let gravcomp = medium::gravity_compensation::<T>(model, &mounts, &link_of);
         let drags = medium::drags::<T>(model, &mounts, &link_of);
@@ -208,7 +209,7 @@ impl<T: Real> Sim<T> {
             planar: link::is_planar(model, &links),
             elliptic: model.opt.cone == Cone::Elliptic,
             warmstart: flags.warmstart,
-            capped: Caps::new(model, &options),
+            capped,
             no_slip: NoSlip::new(model),
             max_newton: caps::cap(model, &options),
             most_rows: options.most_coupled_rows.unwrap_or(MOST_COUPLED_ROWS),

@@ -6,10 +6,15 @@ use crate::rows::{Jacobian, Source};
 use crate::sim::Sim;
 use crate::state::{Capped, Work};
 
+/// Degrees of freedom from which on MuJoCo stores sparse Jacobians (`mj_isSparse`).
+const SPARSE: usize = 60;
+
 kernel_fn! {
     /// Finds the islands of every lane, and the trees of every row.
     pub(super) fn find<'a, T>(sim: &'a Sim<T>, work: &'a Work<T>, c: &'a mut Capped<T>) {
         let tree_of_dof = |d: usize| sim.links[sim.dof_link[d]].tree;
+        // MuJoCo stores the Jacobian of a larger model as its possible entries, that of others as numbers
+        let dense = sim.model.nv < SPARSE;
         let alone = sim.capped.as_ref().is_some_and(|x| x.islands);
         for (i, root) in c.island.iter_mut().enumerate() {
             *root = if alone { i / T::LANES } else { 0 };
@@ -46,13 +51,19 @@ kernel_fn! {
                     }
                 }
                 Jacobian::Joints(terms) => {
-                    for (i, (dof, _)) in terms.iter().enumerate() {
+                    // lanes in which no tree is known yet, and the first trees of the others
+                    let mut unknown = T::bits(T::not(T::none()));
+                    let first = c.homes.len();
+                    for (dof, coefficient) in terms {
+                        let moves = if dense { T::bits(T::zero().lt(coefficient.abs())) } else { u32::MAX };
                         let tree = tree_of_dof(*dof);
-                        c.constrained[tree] |= on;
-                        if i == 0 {
-                            c.homes.push((tree, T::not(T::none())));
-                        } else {
-                            unite::<T>(&mut c.island, tree_of_dof(terms[0].0), tree, on);
+                        c.constrained[tree] |= on & moves;
+                        for (home, lanes) in &c.homes[first..] {
+                            unite::<T>(&mut c.island, *home, tree, on & moves & T::bits(*lanes));
+                        }
+                        if unknown & moves != 0 {
+                            c.homes.push((tree, T::from_bits(unknown & moves)));
+                            unknown &= !moves;
                         }
                     }
                 }
