@@ -24,7 +24,6 @@ import types
 sys.modules.setdefault("imageio", types.ModuleType("imageio"))
 
 import gymnasium as gym
-import mujoco
 import numpy as np
 
 from converging import solve_to_the_end

@@ -1,4 +1,5 @@
 //! Models that are refused, and the message.
+#![allow(dead_code, reason = "every test file uses a part")]
 
 use marathon_physics::Model;
 
@@ -8,4 +9,32 @@ pub fn names(xml: &str, files: &dyn Fn(&str) -> Result<Vec<u8>, String>, parts: 
     for part in parts {
         assert!(message.contains(part), "'{part}' is missing in {message}");
     }
+}
+
+/// The message for a model given as text.
+pub fn message(xml: &str) -> String {
+    match Model::from_xml_str(xml, "bad.xml") {
+        Ok(_) => panic!("accepted: {xml}"),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[track_caller]
+pub fn check(xml: &str, parts: &[&str]) {
+    let message = message(xml);
+    for part in parts {
+        assert!(message.contains(part), "'{part}' is missing in\n  {message}\nfor\n  {xml}");
+    }
+}
+
+/// A model around something in a body that has a geom of its own.
+pub fn in_body(content: &str) -> String {
+    format!(
+        "<mujoco>\n<worldbody>\n<body name=\"b\">\n<geom name=\"g\" size=\"1\"/><joint name=\"j\"/><site name=\"s\"/>\n{content}\n</body>\n</worldbody>\n</mujoco>"
+    )
+}
+
+/// A model around a section next to a world with a body, joint, geom and site.
+pub fn with_section(content: &str) -> String {
+    in_body("").replace("</worldbody>", &format!("</worldbody>\n{content}"))
 }
