@@ -16,6 +16,8 @@ pub const FILES: &[(&str, &[u8])] = marathon_assets::files![
     "hopper.safetensors",
     "HopperController.safetensors",
     "humanoid.safetensors",
+    "HumanoidStyleRun.safetensors",
+    "HumanoidStyleWalk.safetensors",
     "MarathonMan.safetensors",
     "MarathonManBackflip.safetensors",
     "MarathonManController.safetensors",

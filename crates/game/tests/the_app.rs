@@ -390,7 +390,8 @@ fn parts_near_their_clip_are_green_and_far_ones_red() -> Result<(), Box<dyn std:
 #[test]
 fn agents_of_one_clip_take_turns_and_keep_to_it() {
     let mut app = app(&["--mode", "imitate"]);
-    for agent in ["MarathonManWalk-v0", "MarathonManRun-v0", "MarathonManBackflip-v0", "MarathonManWalk-v0"] {
+    let people = ["MarathonManWalk-v0", "MarathonManRun-v0", "MarathonManBackflip-v0"];
+    for agent in people.into_iter().chain(["HumanoidStyleWalk-v0", "HumanoidStyleRun-v0", "MarathonManWalk-v0"]) {
         assert_eq!(app.world().resource::<Scenario>().agent, agent);
         frames(&mut app, 200);
         let (_, episode) = actors(&mut app)[0].clone();

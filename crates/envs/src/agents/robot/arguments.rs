@@ -81,11 +81,11 @@ crate::options! {
         pose: String = AUTO.into(),
         /// Bodies that are the feet, separated by commas. `auto`: the ends of the limbs that reach the ground.
         feet: String = AUTO.into(),
-        /// Stiffness of the servos that replace motors, as a multiple of their largest torque per radian. `auto`: 2, or 4 if a robot
-        /// with three feet or more cannot stand with 2.
+        /// Stiffness of the servos that replace motors, as a multiple of their largest torque per radian. `auto`: 2, or 4 on two
+        /// feet and if a robot with three feet or more cannot stand with 2.
         stiffness: Auto = Auto(None),
         /// Change of a servo's target by an action of 1, rad. `auto`: the change that takes half of the largest torque, between
-        /// 0.15 and 0.6.
+        /// 0.15 and 0.6; 0.6 on two feet, if servos replace motors.
         action_scale: Auto = Auto(None),
         /// Tilt of the root that ends the episode, degrees.
         fall_tilt: Scale = Scale(70.0),

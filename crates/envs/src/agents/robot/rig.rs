@@ -24,7 +24,10 @@ pub const ID: &str = "Robot-v0";
 /// The shipped model.
 const QUADRUPED: &str = marathon_assets::text("agents/quadruped.xml");
 /// Stiffness of new servos as a multiple of their largest torque per radian: first, and if a robot with three feet or more sinks.
+/// Of a robot on two feet, each leg has to carry all the weight, so it has the second from the start.
 const STIFFNESS: [f64; 2] = [2.0, 4.0];
+/// Number of feet of such a robot.
+const BIPED: usize = 2;
 /// Number of feet from which a robot stands without balance.
 const STABLE: usize = 3;
 /// Standard deviations of the joints around the standing pose, rad: legs ahead, legs to a side, others.
@@ -137,7 +140,8 @@ impl Rig {
             let changes = Changes { pose: pose.clone(), replaced, hardened };
             Ok(Self::found(arguments, source(spec), model, root, stance, changes))
         };
-        let rig = with_servos(arguments.stiffness.or(STIFFNESS[0]))?;
+        let stiffness = STIFFNESS[usize::from(first.feet.len() == BIPED)];
+        let rig = with_servos(arguments.stiffness.or(stiffness))?;
         let weak = rig.changes.replaced > 0 && rig.hold.is_some_and(|hold| !hold.stands());
         if weak && arguments.stiffness.0.is_none() {
             let stiffer = with_servos(STIFFNESS[1])?;
@@ -163,7 +167,7 @@ impl Rig {
         let at = Pose::of(&model, &qpos);
         let free = matches!(root, Root::Free { .. });
         let sideways = free && feet.iter().any(|foot| moves_sideways(&model, &at, foot, body));
-        let speed = arguments.speed.or(quickest * if feet.len() == 2 { 0.4 } else { 0.6 });
+        let speed = arguments.speed.or(quickest * if feet.len() == BIPED { 0.4 } else { 0.6 });
         let side = if sideways { 0.5 * speed } else { 0.0 };
         let turn = if free && (sideways || feet.is_empty()) { 1.0 } else { 0.0 };
         let fastest = match arguments.task {
@@ -182,7 +186,8 @@ impl Rig {
         let joints = model.joints.iter().filter(|joint| joint.body != body && joint.kind.dofs() == 1);
         let joints = joints.filter(|joint| model.bodies[joint.body].root_id == model.bodies[body].root_id);
         let joints = joints.map(|joint| [joint.qpos_adr, joint.dof_adr]).collect();
-        let drives = servos::drives(&model, &qpos, height, arguments.action_scale.0);
+        let wide = changes.replaced > 0 && feet.len() == BIPED;
+        let drives = servos::drives(&model, &qpos, height, wide, arguments.action_scale.0);
         let legs = legs(&model, &feet, body).concat();
         let spreads = drives.iter().map(|drive| spread(&model, &at, drive, &legs)).collect();
         let ground = stance::ground_height(&model);

@@ -112,8 +112,9 @@ fn weight(model: &Model) -> f64 {
     model.bodies.iter().map(|body| body.mass).sum::<f64>() * (x * x + y * y + z * z).sqrt()
 }
 
-/// The drives of a model's actuators around a standing pose. `scale`: that of all servos, if it is given, rad.
-pub fn drives(model: &Model, qpos: &[f64], height: f64, scale: Option<f64>) -> Vec<Drive> {
+/// The drives of a model's actuators around a standing pose. `wide`: actions move targets as far as they may, so that they can
+/// ask for all of a servo's torque. `scale`: that of all servos, if it is given, rad.
+pub fn drives(model: &Model, qpos: &[f64], height: f64, wide: bool, scale: Option<f64>) -> Vec<Drive> {
     let drive = |actuator: &Compiled| {
         let Some(index) = servo_joint(model, actuator) else {
             let [low, high] = if actuator.ctrl_limited { actuator.ctrl_range } else { [-1.0, 1.0] };
@@ -126,6 +127,7 @@ pub fn drives(model: &Model, qpos: &[f64], height: f64, scale: Option<f64>) -> V
         let room = if joint.limited { 0.5 * (high - low) } else { f64::INFINITY };
         let found = match joint.kind {
             JointType::Slide => 0.1 * height,
+            _ if wide => SCALES[1],
             _ if stiffness > STIFF.0 * strength => STIFF.1,
             _ => (0.5 * strength / stiffness).clamp(SCALES[0], SCALES[1]),
         };

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Policies that come with the game.
-const FILES: [&[u8]; 14] = [
+const FILES: [&[u8]; 16] = [
     marathon_policies::bytes("hopper.safetensors"),
     marathon_policies::bytes("walker2d.safetensors"),
     marathon_policies::bytes("humanoid.safetensors"),
@@ -17,6 +17,8 @@ const FILES: [&[u8]; 14] = [
     marathon_policies::bytes("MarathonManWalk.safetensors"),
     marathon_policies::bytes("MarathonManRun.safetensors"),
     marathon_policies::bytes("MarathonManBackflip.safetensors"),
+    marathon_policies::bytes("HumanoidStyleWalk.safetensors"),
+    marathon_policies::bytes("HumanoidStyleRun.safetensors"),
     marathon_policies::bytes("MarathonManSteer.safetensors"),
     marathon_policies::bytes("AntController.safetensors"),
     marathon_policies::bytes("TerrainWalker2d.safetensors"),
