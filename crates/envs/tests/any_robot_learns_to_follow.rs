@@ -120,6 +120,20 @@ fn a_robot_with_four_legs_stands() {
 }
 
 /// A file as robots come: a wall but no floor, soft feet, a solver with one iteration, motors.
+/// On two feet, an action can ask a joint for all its torque: in each step, one leg carries the robot.
+#[test]
+fn legs_carry_a_robot_alone_on_two_feet() {
+    let asks = |file: &str| -> Vec<f64> {
+        let servos = rig(file).drives.into_iter().filter_map(|drive| match drive {
+            Drive::Servo(servo) => Some(servo.scale * servo.stiffness / servo.strength),
+            Drive::Direct(_) => None,
+        });
+        servos.collect()
+    };
+    assert!(asks("dm_control/humanoid.xml").iter().all(|torque| *torque > 1.0));
+    assert!(asks("agents/quadruped.xml").iter().all(|torque| *torque < 1.0));
+}
+
 #[test]
 fn a_bare_model_is_made_ready() {
     let quadruped = std::fs::read_to_string(asset("agents/quadruped.xml")).expect("the model");
