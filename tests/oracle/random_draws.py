@@ -1,4 +1,4 @@
-"""What the generators of random models share: elements of MJCF, and draws from a stream of random numbers."""
+"""Elements of MJCF, and draws from a stream of random numbers: the base of all generators of random models."""
 
 import numpy as np
 
