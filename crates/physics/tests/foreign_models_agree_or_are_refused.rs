@@ -483,11 +483,11 @@ fn foreign_models_agree_or_are_refused() {
     }
     let count = |verdict: &str| rows.iter().filter(|row| row.verdict == verdict).count();
     let part = count(DIFFERS) as f64 / (count(DIFFERS) + count(AGREES)).max(1) as f64;
-    assert!(part <= MOST_DIFFERING, "{part} of the models differ");
     let text = table(&rows, same.len(), empty.len());
     if others {
         println!("{text}");
     } else {
+        assert!(part <= MOST_DIFFERING, "{part} of the models differ");
         check_document(&text, &mut failures);
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
