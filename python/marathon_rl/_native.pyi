@@ -578,7 +578,7 @@ class Model:
         """Compile a model given as text, which has no other files; `name` stands for the file in messages."""
     def edit(
         self,
-        changes: dict[str, dict[str, Any]],
+        changes: dict[str, dict[str, Any]] | None = None,
         *,
         remove: dict[str, Sequence[str]] | None = None,
     ) -> Model:
@@ -849,9 +849,9 @@ class Simulation:
     def contacts(self, agent: int = 0) -> dict[str, npt.NDArray[Any]]:
         """Contacts of an agent at the present state and controls, in new arrays.
 
-        ``geom``, ``(n, 2)``, has the indices of the two geoms; ``pos``, ``(n, 3)``, the places, m; ``normal``, ``(n,
-        3)``, the directions from the first geom to the second; ``force``, ``(n, 3)``, the forces on the second geom, N;
-        ``torque``, ``(n, 3)``, the torques on it about the place, N m, which only contacts that resist twisting or
+        ``geom``, of shape ``(n, 2)``, has the indices of the two geoms. The others have shape ``(n, 3)``: ``pos``, the
+        places, m; ``normal``, the directions from the first geom to the second; ``force``, the forces on the second
+        geom, N; ``torque``, the torques on it about the place, N m, which only contacts that resist twisting or
         rolling have.
         """
     @property

@@ -78,6 +78,8 @@ pub enum Command {
     List {
         /// Task to describe: its observation, rewards, commands and options.
         agent: Option<String>,
+        #[command(flatten)]
+        task: TaskOptions,
     },
     /// Show the training settings of a task, or convert a configuration of ML-Agents.
     #[command(subcommand)]

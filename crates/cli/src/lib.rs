@@ -87,7 +87,7 @@ fn dispatch(args: &Args) -> Result<(), CliError> {
         Command::RecordDemo(record) => commands::record_demo::run(record, args.json),
         Command::Play(play) => commands::play::run(play),
         Command::Serve(serve) => commands::serve::run(serve, args.json),
-        Command::List { agent } => commands::list::run(agent.as_deref(), args.json),
+        Command::List { agent, task } => commands::list::run(agent.as_deref(), task, args.json),
         Command::Bench(bench) => bench::run(bench, args.json),
         Command::Config(command) => commands::config::run(command, args.json),
         Command::RolloutWorker => commands::rollout_worker::run(),

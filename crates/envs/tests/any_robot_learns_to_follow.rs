@@ -60,6 +60,44 @@ fn feet_and_their_order_are_found() {
     }
 }
 
+/// The rig of a file with options, or why there is none.
+fn with_options(path: &str, options: &[(&str, &str)]) -> Result<Rig, String> {
+    let given = options.iter().fold(Options::new().with("xml_file", path), |all, (name, value)| all.with(name, *value));
+    Rig::new(&RobotArguments::default().with(&given)).map_err(|error| error.to_string())
+}
+
+#[test]
+fn the_place_of_a_robot_does_not_matter() {
+    let text = std::fs::read_to_string(asset("agents/quadruped.xml")).expect("the file");
+    let root = text.lines().find(|line| line.contains("<body ")).expect("a root").trim().to_owned();
+    let pos = root.split("pos=\"").nth(1).and_then(|rest| rest.split('"').next()).expect("a place");
+    let height = pos.split(' ').nth(2).expect("three numbers");
+    let moved = root.replace(pos, &format!("-1 1 {height}"));
+    let path = common::scratch("robot-elsewhere").join("quadruped.xml");
+    std::fs::write(&path, text.replace(&root, &moved)).expect("the file can be written");
+    let rig = with_options(&path.to_string_lossy(), &[]).expect("a robot");
+    assert_eq!(feet(&rig), [("fl_shank", 0.0), ("fr_shank", 0.5), ("rl_shank", 0.5), ("rr_shank", 0.0)]);
+}
+
+#[test]
+fn options_replace_what_is_found() {
+    let quadruped = asset("agents/quadruped.xml");
+    let none = with_options(&quadruped, &[("feet", "none")]).expect("a robot");
+    assert!(none.feet.is_empty() && !none.clock);
+    let kept = with_options(&asset("dm_control/humanoid.xml"), &[("stiffness", "0")]).expect("a robot");
+    assert!(kept.drives.iter().all(|drive| matches!(drive, Drive::Direct(_))));
+    let reference = with_options(&quadruped, &[("pose", "reference")]).expect("a robot");
+    assert!(reference.to_string().contains("pose       the reference pose"));
+    for (name, value, part) in [
+        ("feet", "fl_shank,fl_shank", "feet has 'fl_shank' twice"),
+        ("pose", "sitting", "expected auto, reference"),
+        ("step_rate", "100", "step_rate is 100, expected at most 25"),
+    ] {
+        let Err(error) = with_options(&quadruped, &[(name, value)]) else { panic!("{name}={value} is accepted") };
+        assert!(error.contains(part), "{error}");
+    }
+}
+
 #[test]
 fn what_is_no_robot_is_refused() {
     let folder = common::scratch("no-robots");

@@ -42,8 +42,13 @@ impl Model {
 
     /// A copy of the model with other attributes, `{kind: {name: {attribute: value}}}` or `{section: {attribute: value}}`, and
     /// without the elements of `remove`, `{kind: [name]}`, and what refers to them.
-    #[pyo3(signature = (changes, *, remove = None))]
-    fn edit(&self, py: Python<'_>, changes: &Bound<'_, PyDict>, remove: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+    #[pyo3(signature = (changes = None, *, remove = None))]
+    fn edit(
+        &self,
+        py: Python<'_>,
+        changes: Option<&Bound<'_, PyDict>>,
+        remove: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
         let Some(spec) = &self.spec else {
             let expected = "expected one of Model.from_xml_path or Model.from_xml_string";
             return Err(error::value(format!("the model of a task cannot be edited, {expected}")));

@@ -32,11 +32,11 @@ const SECTIONS: [&str; 4] = ["compiler", "option", "statistic", "visual"];
 /// Applies changes, `{kind: {name: {attribute: value}}}` or `{section: {attribute: value}}`, and removes elements, `{kind: [name]}`.
 pub fn edited(
     spec: &ModelSpec,
-    changes: &Bound<'_, PyDict>,
+    changes: Option<&Bound<'_, PyDict>>,
     remove: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<ModelSpec> {
     let mut spec = spec.clone();
-    for (of, what) in changes.iter() {
+    for (of, what) in changes.into_iter().flat_map(|changes| changes.iter()) {
         let of = text(&of, "a kind of elements")?;
         let what = dict(&what, &format!("changes['{of}']"))?;
         if SECTIONS.contains(&of.as_str()) {

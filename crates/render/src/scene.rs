@@ -85,14 +85,21 @@ pub struct AgentView {
 impl Scene {
     /// Collects the visible geoms of `model`.
     ///
-    /// It leaves out geoms with alpha 0, meshes (which the simulator refuses), and MuJoCo's hidden groups 3 and up,
-    /// unless every geom of the moving bodies is in one of those.
+    /// It leaves out geoms with alpha 0, and MuJoCo's hidden groups 3 and up, unless every geom of the moving bodies is in
+    /// one of those. A moving body that would show only meshes shows its hidden shapes, or, without any, boxes of the
+    /// size of the meshes that collide.
     pub fn new(model: &Model) -> Self {
         let moving = |geom: &Geom| model.bodies.get(geom.body).is_some_and(|body| body.weld_id != 0);
         let opaque = |geom: &Geom| geom.rgba[3] > 0.0;
         let listed = |geom: &Geom| geom.group < FIRST_HIDDEN_GROUP;
         let all_hidden = !model.geoms.iter().any(|geom| moving(geom) && opaque(geom) && listed(geom));
-        let visible = |geom: &Geom| opaque(geom) && (listed(geom) || (all_hidden && moving(geom)));
+        let simple = |geom: &Geom| opaque(geom) && geom.kind != GeomType::Mesh;
+        let of_body = |body: usize| model.geoms.iter().filter(move |geom| geom.body == body);
+        let bare = |body: usize| !of_body(body).any(|geom| simple(geom) && listed(geom));
+        let visible = |geom: &Geom| match geom.kind {
+            GeomType::Mesh => opaque(geom) && !of_body(geom.body).any(simple),
+            _ => opaque(geom) && (listed(geom) || moving(geom) && (all_hidden || bare(geom.body))),
+        };
 
         let tree = model.joints.first().and_then(|joint| model.bodies.get(joint.body)).map(|body| body.root_id);
         let rest = kinematics::pose(model, &model.qpos0, 0).ok();
@@ -327,7 +334,9 @@ fn shape_of(geom: &Geom) -> Option<Shape> {
         GeomType::Ellipsoid => Some(Shape::Ellipsoid { semi: geom.size }),
         GeomType::Cylinder => Some(Shape::Cylinder { radius: x, half: y }),
         GeomType::Box => Some(Shape::Box { half: geom.size }),
-        GeomType::Plane | GeomType::Hfield | GeomType::Mesh => None,
+        // a mesh that nothing touches has no size
+        GeomType::Mesh => geom.hull.map(|_| Shape::Box { half: geom.size }),
+        GeomType::Plane | GeomType::Hfield => None,
     }
 }
 

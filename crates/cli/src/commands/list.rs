@@ -3,8 +3,8 @@
 use crate::error::CliError;
 use marathon_envs::{CommandRange, ObsGroup, OptionInfo, registry};
 use marathon_physics::lanes::Isa;
-use marathon_runs::recipe;
 use marathon_runs::terminal::{print_json, say};
+use marathon_runs::{TaskConfig, TaskOptions, recipe};
 use serde::Serialize;
 
 /// Information about an agent.
@@ -65,13 +65,13 @@ struct Argument {
 /// Lists the agents, or shows all about one.
 ///
 /// # Errors
-/// If the agent does not exist, or cannot be simulated.
-pub fn run(agent: Option<&str>, json: bool) -> Result<(), CliError> {
+/// If the agent does not exist, does not have such options, or cannot be simulated.
+pub fn run(agent: Option<&str>, options: &TaskOptions, json: bool) -> Result<(), CliError> {
     let ids = match agent {
         Some(name) => vec![name.into()],
         None => registry::ids(),
     };
-    let entries = ids.iter().map(|id| entry(id)).collect::<Result<Vec<_>, _>>()?;
+    let entries = ids.iter().map(|id| entry(id, options)).collect::<Result<Vec<_>, _>>()?;
     match (&entries[..], agent) {
         _ if json => print_json(&serde_json::json!({ "agents": entries })),
         ([entry], Some(_)) => tell(entry),
@@ -80,9 +80,10 @@ pub fn run(agent: Option<&str>, json: bool) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Collects the information about an agent, by any of its names.
-fn entry(name: &str) -> Result<Entry, CliError> {
-    let agent = registry::agent(name)?;
+/// Collects the information about an agent with options, by any of its names.
+fn entry(name: &str, options: &TaskOptions) -> Result<Entry, CliError> {
+    let task = TaskConfig::named(name)?.with(options)?;
+    let agent = registry::agent(&task.agent)?.with_options(&task.options)?;
     let factory = agent.clone().shards(Isa::best())?;
     let spec = factory.spec();
     let range = |(low, high): (&f32, &f32)| [finite(*low), finite(*high)];

@@ -1,5 +1,6 @@
 //! Arguments of the task for any model.
 
+use super::stance::AUTO;
 use crate::agent::options::{Choice, OptionValue, Scale, Value};
 
 /// The robot's goal.
@@ -41,9 +42,6 @@ impl Auto {
     }
 }
 
-/// The value for a number that follows from the model.
-const AUTO: &str = "auto";
-
 impl OptionValue for Auto {
     const EXPECTED: &'static str = "auto, or a finite number, 0 or more";
     fn value(&self) -> Value {
@@ -77,12 +75,13 @@ crate::options! {
         /// Height of a step, m. `auto`: 0.2 H, between 0.02 and 0.1.
         step_height: Auto = Auto(None),
         /// Keyframe with the standing pose. `auto`: `spawn`, `knees_bent`, `home`, `stand` or the first one; the reference
-        /// pose of a model without keyframes.
+        /// pose of a model without keyframes, or of any with `reference`.
         pose: String = AUTO.into(),
-        /// Bodies that are the feet, separated by commas. `auto`: the ends of the limbs that reach the ground.
+        /// Bodies that are the feet, separated by commas. `auto`: the ends of the limbs that reach the ground. `none`: no
+        /// feet, as on wheels.
         feet: String = AUTO.into(),
         /// Stiffness of the servos that replace motors, as a multiple of their largest torque per radian. `auto`: 2, or 4 on two
-        /// feet and if a robot with three feet or more cannot stand with 2.
+        /// feet and if a robot with three feet or more cannot stand with 2. 0 keeps the motors: their torque is the action.
         stiffness: Auto = Auto(None),
         /// Change of a servo's target by an action of 1, rad. `auto`: the change that takes half of the largest torque, between
         /// 0.15 and 0.6; 0.6 on two feet, if servos replace motors.

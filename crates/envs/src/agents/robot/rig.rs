@@ -133,7 +133,15 @@ impl Rig {
             let replaced = servos::replace_motors(&mut spec, first.height, ratio).map_err(mjcf)?;
             let model = spec.compile().map_err(mjcf)?;
             if model.nu == 0 {
-                return Err(wrong("its model has no actuators".into()));
+                return Err(wrong(
+                    "its model has no actuators; add <motor> or <position> elements for its joints".into(),
+                ));
+            }
+            let quickest = 0.5 / (model.opt.timestep * edits::frame_skip(&model) as f64);
+            if let Some(rate) = arguments.step_rate.0.filter(|rate| *rate > quickest) {
+                return Err(wrong(format!(
+                    "step_rate is {rate}, expected at most {quickest}, half of the decisions per second"
+                )));
             }
             // the numbers of geoms have changed with the ground
             let stance = stance::stand(&model, root, first.qpos.clone(), &arguments.feet).map_err(wrong)?;
@@ -180,7 +188,7 @@ impl Rig {
         let of_foot = |g: usize| feet.iter().any(|foot| model.bodies[model.geoms[g].body].weld_id == foot.body);
         let shell = (0..model.geoms.len())
             .filter(|g| model.bodies[model.geoms[*g].body].root_id == model.bodies[body].root_id && !feet.is_empty())
-            .filter(|g| model.geoms[*g].contype != 0 || model.geoms[*g].conaffinity != 0)
+            .filter(|g| stance::collides(&model, *g))
             .filter(|g| !standing.contains(g) && !of_foot(*g))
             .collect();
         let joints = model.joints.iter().filter(|joint| joint.body != body && joint.kind.dofs() == 1);
@@ -305,7 +313,11 @@ impl fmt::Display for Rig {
         }
         if let Some(hold) = self.hold {
             let Hold { height, tilt } = hold;
-            let note = if hold.stands() { "" } else { ": too weak to stand still" };
+            let note = match hold.stands() {
+                true => "",
+                false if height < 0.0 => ": its root falls through the ground, which it cannot touch",
+                false => ": too weak to stand still",
+            };
             writeln!(f, "stands     {height:.2} of its height and {tilt:.0} degrees off after 1 s{note}")?;
         }
         if self.changes.hardened > 0 {

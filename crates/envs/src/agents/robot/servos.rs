@@ -75,9 +75,12 @@ fn strength(model: &Model, actuator: &Compiled, joint: usize, height: f64) -> f6
     limits.min_by(f64::total_cmp).unwrap_or_else(|| weight(model) * height * UNLIMITED)
 }
 
-/// Replaces the motors of a model, which have names, by servos `ratio` times as stiff as they are strong, per radian. Returns how
-/// many there were.
+/// Replaces the motors of a model, which have names, by servos `ratio` times as stiff as they are strong, per radian. Without
+/// stiffness they stay. Returns how many there were.
 pub fn replace_motors(spec: &mut ModelSpec, height: f64, ratio: f64) -> Result<usize, MjcfError> {
+    if ratio == 0.0 {
+        return Ok(0);
+    }
     let model = spec.compile()?;
     let pose = Pose::of(&model, &model.qpos0);
     let mut replaced = 0;

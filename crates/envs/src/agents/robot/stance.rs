@@ -4,8 +4,14 @@ use glam::{DQuat, DVec3};
 use marathon_motion::kinematics::Pose;
 use marathon_physics::model::{Geom, GeomType, JointType, Model};
 
+/// The value of an option that follows from the model.
+pub const AUTO: &str = "auto";
+/// The value of `feet` for a robot that has none, such as one on wheels.
+const NO_FEET: &str = "none";
 /// Keyframes that hold a standing pose, by preference.
 const POSES: [&str; 4] = ["spawn", "knees_bent", "home", "stand"];
+/// The value of `pose` for the reference pose of a model with keyframes.
+const REFERENCE: &str = "reference";
 /// Gymnasium's number for the pose at the start.
 const INIT_QPOS: &str = "init_qpos";
 /// Part of a joint's range that the reference pose keeps from its ends.
@@ -16,6 +22,8 @@ const REACH: f64 = 0.15;
 const LEVEL: f64 = 0.99;
 /// Largest distance of a wheel's center from its axis, as a part of its radius.
 const CENTERED: f64 = 0.1;
+/// Directions in which a mesh has to reach equally far to be a wheel.
+const DIRECTIONS: usize = 16;
 /// Without legs the root or its neighbors lie on the ground, this close (part of the height, and meters).
 const LYING: f64 = 0.02;
 
@@ -47,6 +55,8 @@ pub struct Foot {
     pub sole: [f64; 3],
     /// The same in the world, m.
     pub place: [f64; 3],
+    /// Whether it is to the right of the root, which faces +x.
+    pub right: bool,
 }
 
 /// A number of things: `1 joint`, `2 joints`.
@@ -80,17 +90,24 @@ pub fn root(model: &Model) -> Result<(usize, Root), String> {
 /// The standing pose, where it comes from, and whether the model's author has chosen it. `name`: the keyframe, or `auto`.
 pub fn pose(model: &Model, name: &str) -> Result<(Vec<f64>, String, bool), String> {
     let key = |name: &str| model.keyframes.iter().find(|key| key.name == name);
-    if name != "auto" {
-        let known = || model.keyframes.iter().map(|key| key.name.as_str()).collect::<Vec<_>>().join(", ");
+    if name != AUTO && name != REFERENCE {
+        let known: Vec<&str> =
+            model.keyframes.iter().map(|key| key.name.as_str()).filter(|name| !name.is_empty()).collect();
+        let known = match known.as_slice() {
+            [] => "; the model has no keyframes with names".to_owned(),
+            known => format!(" or a keyframe of the model: {}", known.join(", ")),
+        };
         return key(name)
             .map(|key| (key.qpos.clone(), format!("keyframe '{name}'"), true))
-            .ok_or_else(|| format!("pose is '{name}', expected auto or a keyframe of the model: {}", known()));
+            .ok_or_else(|| format!("pose is '{name}', expected auto, reference{known}"));
     }
-    if let Some(found) = POSES.iter().find_map(|name| key(name)).or(model.keyframes.first()) {
+    let keyframes = if name == AUTO { &model.keyframes[..] } else { &[] };
+    let key = |name: &str| keyframes.iter().find(|key| key.name == name);
+    if let Some(found) = POSES.iter().find_map(|name| key(name)).or(keyframes.first()) {
         return Ok((found.qpos.clone(), format!("keyframe '{}'", found.name), true));
     }
     let given = model.numerics.iter().find(|(name, qpos)| name == INIT_QPOS && qpos.len() == model.nq);
-    if let Some((_, qpos)) = given {
+    if let Some((_, qpos)) = given.filter(|_| name == AUTO) {
         return Ok((qpos.clone(), format!("the model's {INIT_QPOS}"), true));
     }
     let mut qpos = model.qpos0.clone();
@@ -115,9 +132,11 @@ pub fn pose(model: &Model, name: &str) -> Result<(Vec<f64>, String, bool), Strin
     Ok((qpos, format!("the reference pose{moved}"), false))
 }
 
-/// Whether a geom can touch the ground.
-fn collides(geom: &Geom) -> bool {
-    geom.contype != 0 || geom.conaffinity != 0
+/// Whether a geom can touch the ground: by its own masks, or in a pair of the file.
+pub fn collides(model: &Model, geom: usize) -> bool {
+    let own = &model.geoms[geom];
+    let paired = || model.pairs.iter().any(|pair| pair.geoms.contains(&geom));
+    own.contype != 0 || own.conaffinity != 0 || paired()
 }
 
 /// The orientation of a geom in the world.
@@ -165,8 +184,7 @@ fn sign(x: f64) -> f64 {
 
 /// Moving bodies with what is welded to them.
 fn geoms_of(model: &Model, body: usize) -> impl Iterator<Item = usize> {
-    (0..model.geoms.len())
-        .filter(move |g| model.bodies[model.geoms[*g].body].weld_id == body && collides(&model.geoms[*g]))
+    (0..model.geoms.len()).filter(move |g| model.bodies[model.geoms[*g].body].weld_id == body && collides(model, *g))
 }
 
 /// Whether a body is a wheel: it turns without end about the axis of round geoms.
@@ -177,18 +195,39 @@ pub fn is_wheel(model: &Model, pose: &Pose, body: usize) -> bool {
         return false;
     }
     let axis = pose.axes[joint];
-    let is_round = |g: usize| {
+    let rolls = |g: usize| {
         let geom = &model.geoms[g];
         let off = pose.point(geom.body, DVec3::from_array(geom.pos)) - pose.anchors[joint];
         let centered = off.cross(axis).length() < CENTERED * geom.size[0];
         match geom.kind {
             GeomType::Sphere | GeomType::Ellipsoid => centered,
             GeomType::Cylinder => centered && (turn(pose, geom) * DVec3::Z).dot(axis).abs() > LEVEL,
+            GeomType::Mesh => geom.hull.is_some_and(|hull| {
+                let place = |v: &[f64; 3]| {
+                    pose.point(geom.body, DVec3::from_array(geom.pos)) + turn(pose, geom) * DVec3::from_array(*v)
+                };
+                is_round(model.hulls[hull].vertices.iter().map(place), pose.anchors[joint], axis)
+            }),
             _ => false,
         }
     };
     let mut geoms = geoms_of(model, body).peekable();
-    geoms.peek().is_some() && geoms.all(is_round)
+    geoms.peek().is_some() && geoms.all(rolls)
+}
+
+/// Whether points reach equally far from an axis in all directions across it.
+fn is_round(points: impl Iterator<Item = DVec3>, anchor: DVec3, axis: DVec3) -> bool {
+    let (u, v) = axis.any_orthonormal_pair();
+    let mut reach = [0.0f64; DIRECTIONS];
+    for point in points {
+        let off = point - anchor;
+        for (i, reach) in reach.iter_mut().enumerate() {
+            let (sin, cos) = libm::sincos(std::f64::consts::TAU * i as f64 / DIRECTIONS as f64);
+            *reach = reach.max(off.dot(u) * cos + off.dot(v) * sin);
+        }
+    }
+    let (least, most) = reach.iter().fold((f64::INFINITY, 0.0f64), |(a, b), x| (a.min(*x), b.max(*x)));
+    least > (1.0 - CENTERED) * most
 }
 
 /// How a robot stands.
@@ -209,7 +248,7 @@ pub fn stand(model: &Model, root: (usize, Root), mut qpos: Vec<f64>, names: &str
     let mut pose = Pose::of(model, &qpos);
     let bottom = |pose: &Pose, g: usize| lowest(model, pose, &model.geoms[g]);
     let own: Vec<usize> =
-        (0..model.geoms.len()).filter(|g| of_robot(model.geoms[*g].body) && collides(&model.geoms[*g])).collect();
+        (0..model.geoms.len()).filter(|g| of_robot(model.geoms[*g].body) && collides(model, *g)).collect();
     let Some(low) = own.iter().map(|g| bottom(&pose, *g).z).min_by(f64::total_cmp) else {
         return Err("none of its geoms can touch the ground".into());
     };
@@ -231,12 +270,16 @@ pub fn stand(model: &Model, root: (usize, Root), mut qpos: Vec<f64>, names: &str
     (1..model.bodies.len()).filter(|b| moving(*b)).for_each(|b| carries[carrier(b)] = true);
     let sole = |b: usize| geoms_of(model, b).map(|g| bottom(&pose, g)).min_by(|a, b| a.z.total_cmp(&b.z));
     let ends: Vec<usize> = match names {
-        "auto" => (1..model.bodies.len())
+        AUTO => (1..model.bodies.len())
             .filter(|b| moving(*b) && of_robot(*b) && *b != body && !carries[*b] && !is_wheel(model, &pose, *b))
             .filter(|b| sole(*b).is_some_and(|p| p.z - ground <= REACH * height))
             .collect(),
+        NO_FEET => Vec::new(),
         names => names.split(',').map(|name| named_foot(model, name.trim())).collect::<Result<_, _>>()?,
     };
+    if let Some(twice) = ends.iter().enumerate().find(|(i, b)| ends[..*i].contains(b)) {
+        return Err(format!("feet has '{}' twice", model.bodies[*twice.1].name));
+    }
     let mut feet = Vec::new();
     for b in ends {
         let Some(point) = sole(b) else {
@@ -249,15 +292,17 @@ pub fn stand(model: &Model, root: (usize, Root), mut qpos: Vec<f64>, names: &str
             geoms: geoms_of(model, b).filter(near).collect(),
             sole: local.to_array(),
             place: point.to_array(),
+            right: point.y < pose.pos[body].y,
         });
     }
     // with the trunk on the ground, limbs do not carry it
     let lies = geoms_of(model, body).any(|g| bottom(&pose, g).z - ground <= (LYING * height).max(5e-3));
-    if lies && names == "auto" {
+    if lies && names == AUTO {
         feet.clear();
     }
+    let ahead = pose.pos[body].x;
     feet.sort_by(|a, b| {
-        let order = |foot: &Foot| ((foot.place[0] / (0.2 * height)).round(), foot.place[1]);
+        let order = |foot: &Foot| (((foot.place[0] - ahead) / (0.2 * height)).round(), foot.place[1]);
         let ((ax, ay), (bx, by)) = (order(a), order(b));
         bx.total_cmp(&ax).then(by.total_cmp(&ay))
     });
@@ -267,9 +312,15 @@ pub fn stand(model: &Model, root: (usize, Root), mut qpos: Vec<f64>, names: &str
 fn named_foot(model: &Model, name: &str) -> Result<usize, String> {
     let found = model.bodies.iter().position(|body| body.name == name && body.weld_id != 0);
     found.map(|b| model.bodies[b].weld_id).ok_or_else(|| {
+        if let Some(geom) = model.geoms.iter().find(|geom| geom.name == name) {
+            return format!(
+                "feet has '{name}', a geom of the body '{}'; expected bodies",
+                model.bodies[geom.body].name
+            );
+        }
         let near = marathon_physics::hint::nearest(name, model.bodies.iter().skip(1).map(|b| b.name.as_str()));
         let hint = near.map_or(String::new(), |near| format!("; did you mean '{near}'?"));
-        format!("feet has '{name}', expected bodies of the model that move{hint}")
+        format!("feet has '{name}', expected none or bodies of the model that move{hint}")
     })
 }
 
@@ -298,7 +349,7 @@ pub fn phases(feet: &[Foot]) -> Vec<f64> {
     let mut order = [0usize; 2];
     feet.iter()
         .map(|foot| {
-            let side = usize::from(foot.place[1] < 0.0);
+            let side = usize::from(foot.right);
             let rank = order[side];
             order[side] += 1;
             0.5 * ((rank + side) % 2) as f64
