@@ -5,7 +5,7 @@ use super::slots::pyramid_share;
 use crate::algebra::spatial::*;
 use crate::lanes::Real;
 use crate::rows::{FloorRow, former};
-use crate::sim::{Sim, impedance};
+use crate::sim::{Sim, impedance, least_sliding};
 use crate::state::{Group, Work};
 
 /// Finds the contacts with the floor and writes their rows.
@@ -54,9 +54,10 @@ pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
         if let Some(factor) = group.friction() {
             // a frictionless contact is a flat pyramid, so nothing varies
             if c.mu[0] > T::scalar(0.0) {
+                let factor = factor.max(T::lit(least_sliding::<T>(false)).div(mu[0]));
                 d *= pyramid_share(mu[0], factor);
+                mu = [mu[0] * factor, mu[1] * factor];
             }
-            mu = [mu[0] * factor, mu[1] * factor];
         }
         let vel = &vels[c.link];
         let v = cross_add(&ang(vel), &r, &lin(vel));

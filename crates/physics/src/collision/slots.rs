@@ -5,7 +5,7 @@ use crate::algebra::spatial::*;
 use crate::geometry::Touch;
 use crate::lanes::{Real, kernel_fn};
 use crate::rows::{Block, Jacobian, Source};
-use crate::sim::{Cost, GeomPairOf, PairSpec, ShapePair, Sim, impedance};
+use crate::sim::{Cost, GeomPairOf, PairSpec, ShapePair, Sim, impedance, least_sliding};
 use crate::state::{Group, Work};
 
 /// The slots of the current class of pairs: the first one, and how many of them each lane has filled.
@@ -158,7 +158,8 @@ fn rows<T: Real>(
     let v = sub3(&velocity[1], &velocity[0]);
     let w = sub3(&spin[1], &spin[0]);
 
-    let friction = group.friction();
+    let least = || T::lit(least_sliding::<T>(pair.cost == Cost::Elliptic)).div(T::splat(pair.friction[0]));
+    let friction = group.friction().map(|factor| factor.max(least()));
     let violation = touch.dist - T::splat(pair.soft.margin);
     let (imp, mut d) = impedance(&pair.soft, violation);
     if let (Some(factor), Cost::Pyramid) = (friction, pair.cost) {

@@ -17,7 +17,7 @@ const LARGEST: f32 = (1u32 << 30) as f32;
 pub(super) fn read(bytes: &[u8]) -> Result<Triangles, String> {
     let text =
         if bytes.starts_with(b"solid") { "; text STL is not supported, save the mesh as binary STL" } else { "" };
-    let count = word(bytes, 80).map(i32::from_le_bytes);
+    let count = word(bytes, 80).map(u32::from_le_bytes);
     let Some(count) = count else {
         return Err(format!("found {} bytes, expected a binary STL header of {HEADER}{text}", bytes.len()));
     };

@@ -132,10 +132,10 @@ fn sensor(element: &Element, names: &Registry, model: &Model, adr: usize) -> Res
     if kind == SensorType::InsideSite {
         intprm[0] = i32::from(attrs.flag_or("enclosed", false)?);
     }
-    // delayed or decimated readings, and readings of meshes are not computed
+    // delayed or decimated readings, and readings of meshes that were not read are not computed
     let interval: [f64; 2] = attrs.partial_or("interval", [0.0; 2])?;
     let unknown = |object| match object {
-        SensorObject::Geom(g) => model.geoms[g].kind == GeomType::Mesh,
+        SensorObject::Geom(g) => model.geoms[g].kind == GeomType::Mesh && model.geoms[g].mesh.is_none(),
         _ => false,
     };
     if attrs.number_or("delay", 0.0)? != 0.0 || interval != [0.0; 2] || unknown(object) || unknown(reference) {

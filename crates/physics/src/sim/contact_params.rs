@@ -1,11 +1,20 @@
 //! Selection of colliding geoms, and their contact parameters.
 
 use super::weld::BodyMount;
-use crate::model::{Geom, Model, Pair};
+use crate::lanes::Real;
+use crate::model::{Cone, Geom, Model, Pair};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Smallest friction coefficient (MuJoCo's `mjMINMU`).
 const LEAST_FRICTION: f64 = 1e-5;
+/// Smallest sliding coefficient of a pyramid in single precision. The stiffness of its edges grows with the inverse square, and
+/// bodies sink through the ground at 1e-3.
+const LEAST_OF_PYRAMIDS: f64 = 1e-2;
+
+/// Smallest sliding coefficient of contacts in a precision.
+pub(crate) fn least_sliding<T: Real>(elliptic: bool) -> f64 {
+    if elliptic || T::EPSILON < 1e-10 { LEAST_FRICTION } else { LEAST_OF_PYRAMIDS }
+}
 
 /// Parameters of a contact between two geoms.
 pub(super) struct ContactParams {
@@ -21,8 +30,9 @@ pub(super) struct ContactParams {
 }
 
 impl ContactParams {
-    /// Contact parameters of the colliding geoms `i` and `j`, from the declared pair with that number if there is one.
-    pub fn of(model: &Model, i: usize, j: usize, declared: Option<usize>) -> Self {
+    /// Contact parameters of the colliding geoms `i` and `j` in a precision, from the declared pair with that number if there is
+    /// one.
+    pub fn of<T: Real>(model: &Model, i: usize, j: usize, declared: Option<usize>) -> Self {
         let mut params = match declared {
             Some(number) => ContactParams { declared, ..ContactParams::declared(&model.pairs[number]) },
             None => ContactParams::combine(&model.geoms[i], &model.geoms[j]),
@@ -34,6 +44,8 @@ impl ContactParams {
             params.friction = all.friction;
         }
         params.friction = params.friction.map(|f| f.max(LEAST_FRICTION));
+        let least = least_sliding::<T>(model.opt.cone == Cone::Elliptic);
+        params.friction[..2].iter_mut().for_each(|f| *f = f.max(least));
         params
     }
 

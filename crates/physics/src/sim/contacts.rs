@@ -145,7 +145,7 @@ pub(super) fn contacts<T: Real>(
             }
             let declarations = declared.map_or(vec![None], |numbers| numbers.iter().copied().map(Some).collect());
             for number in declarations {
-                let params = ContactParams::of(model, i, j, number);
+                let params = ContactParams::of::<T>(model, i, j, number);
                 if floor_points::add::<T>(model, mounts, (a, b), link(b), &params, &mut out.floor, &mut out.hard) {
                     continue;
                 }

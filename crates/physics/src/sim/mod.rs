@@ -33,6 +33,7 @@ pub(crate) use actuator::{Activation, ActuatorSpec, TendonForceRange, Transmissi
 pub(crate) use adhesion::AdhesionSpec;
 pub(crate) use broad::Broad;
 pub(crate) use caps::Caps;
+pub(crate) use contact_params::least_sliding;
 pub(crate) use contacts::{Contacts, rank};
 pub(crate) use drive::{DriveKind, DriveSpec};
 pub(crate) use equality::{EqualitySpec, Frames, Length, Tie};
