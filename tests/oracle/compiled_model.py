@@ -312,10 +312,8 @@ def sensor_object(kind, i):
 
 def sensor(m, i):
     kind = mujoco.mjtSensor(m.sensor_type[i]).name.removeprefix("mjSENS_")
-    # readings of meshes are not computed
     ends = [(m.sensor_objtype[i], m.sensor_objid[i]), (m.sensor_reftype[i], m.sensor_refid[i])]
-    mesh = any(t == mujoco.mjtObj.mjOBJ_GEOM and m.geom_type[k] == mujoco.mjtGeom.mjGEOM_MESH for t, k in ends)
-    supported = kind in SENSORS and not mesh
+    supported = kind in SENSORS
     return {
         "name": name(m, mujoco.mjtObj.mjOBJ_SENSOR, i), "kind": SENSORS[kind] if supported else "Unsupported",
         "object": sensor_object(*ends[0]) if supported else "None",

@@ -5,7 +5,7 @@ mod common;
 use marathon_envs::agents::robot::arguments::RobotArguments;
 use marathon_envs::agents::robot::rig::Rig;
 use marathon_envs::agents::robot::servos::Drive;
-use marathon_envs::options::OptionSet;
+use marathon_envs::options::{OptionSet, Value};
 use marathon_envs::{Options, VecEnv, VecEnvOptions, registry};
 use std::path::{Path, PathBuf};
 
@@ -62,7 +62,9 @@ fn feet_and_their_order_are_found() {
 
 /// The rig of a file with options, or why there is none.
 fn with_options(path: &str, options: &[(&str, &str)]) -> Result<Rig, String> {
-    let given = options.iter().fold(Options::new().with("xml_file", path), |all, (name, value)| all.with(name, *value));
+    let read = |text: &str| text.parse::<Value>().expect("a value");
+    let given =
+        options.iter().fold(Options::new().with("xml_file", path), |all, (name, value)| all.with(name, read(value)));
     Rig::new(&RobotArguments::default().with(&given)).map_err(|error| error.to_string())
 }
 
