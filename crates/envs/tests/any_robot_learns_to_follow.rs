@@ -14,8 +14,7 @@ fn asset(name: &str) -> String {
 }
 
 fn rig(file: &str) -> Rig {
-    let arguments = RobotArguments::default().with(&Options::new().with("xml_file", asset(file).as_str()));
-    let rig = Rig::new(&arguments).unwrap_or_else(|error| panic!("{file}: {error}"));
+    let rig = with_options(&asset(file), &[]).unwrap_or_else(|error| panic!("{file}: {error}"));
     println!("--- {file}\n{rig}");
     rig
 }

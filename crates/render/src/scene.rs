@@ -1,5 +1,7 @@
 //! The contents of a picture: a model's visible geoms, and frames of one or several agents posed from `qpos`.
 
+use std::collections::BTreeSet;
+
 use glam::{DMat3, DVec3};
 use marathon_physics::model::{Geom, GeomType, Model};
 
@@ -86,19 +88,24 @@ impl Scene {
     /// Collects the visible geoms of `model`.
     ///
     /// It leaves out geoms with alpha 0, and MuJoCo's hidden groups 3 and up, unless every geom of the moving bodies is in
-    /// one of those. A moving body that would show only meshes shows its hidden shapes, or, without any, boxes of the
-    /// size of the meshes that collide.
+    /// one of those. A moving body that would show only meshes shows its hidden shapes. Without any simple shape, a body
+    /// shows boxes of the size of its meshes that collide.
     pub fn new(model: &Model) -> Self {
         let moving = |geom: &Geom| model.bodies.get(geom.body).is_some_and(|body| body.weld_id != 0);
         let opaque = |geom: &Geom| geom.rgba[3] > 0.0;
         let listed = |geom: &Geom| geom.group < FIRST_HIDDEN_GROUP;
         let all_hidden = !model.geoms.iter().any(|geom| moving(geom) && opaque(geom) && listed(geom));
-        let simple = |geom: &Geom| opaque(geom) && geom.kind != GeomType::Mesh;
-        let of_body = |body: usize| model.geoms.iter().filter(move |geom| geom.body == body);
-        let bare = |body: usize| !of_body(body).any(|geom| simple(geom) && listed(geom));
+        // bodies with simple shapes, and those that would show one
+        let (mut simple, mut shows) = (BTreeSet::new(), BTreeSet::new());
+        for geom in model.geoms.iter().filter(|geom| opaque(geom) && geom.kind != GeomType::Mesh) {
+            simple.insert(geom.body);
+            if listed(geom) {
+                shows.insert(geom.body);
+            }
+        }
         let visible = |geom: &Geom| match geom.kind {
-            GeomType::Mesh => opaque(geom) && !of_body(geom.body).any(simple),
-            _ => opaque(geom) && (listed(geom) || moving(geom) && (all_hidden || bare(geom.body))),
+            GeomType::Mesh => opaque(geom) && !simple.contains(&geom.body),
+            _ => opaque(geom) && (listed(geom) || moving(geom) && (all_hidden || !shows.contains(&geom.body))),
         };
 
         let tree = model.joints.first().and_then(|joint| model.bodies.get(joint.body)).map(|body| body.root_id);

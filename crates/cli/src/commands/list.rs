@@ -82,8 +82,13 @@ pub fn run(agent: Option<&str>, options: &TaskOptions, json: bool) -> Result<(),
 
 /// Collects the information about an agent with options, by any of its names.
 fn entry(name: &str, options: &TaskOptions) -> Result<Entry, CliError> {
-    let task = TaskConfig::named(name)?.with(options)?;
-    let agent = registry::agent(&task.agent)?.with_options(&task.options)?;
+    // a task with options derives the facts of a robot again
+    let agent = if options.given.is_empty() {
+        registry::agent(name)?
+    } else {
+        let task = TaskConfig::named(name)?.with(options)?;
+        registry::agent(&task.agent)?.with_options(&task.options)?
+    };
     let factory = agent.clone().shards(Isa::best())?;
     let spec = factory.spec();
     let range = |(low, high): (&f32, &f32)| [finite(*low), finite(*high)];

@@ -126,7 +126,7 @@ fn share_tendons<T: Real>(sim: &Sim<T>, group: &Group<T>, forces: &mut Forces<T>
         let share = T::select(outside, share, one);
         // a sum at its bound or beyond does not change with the velocity, and the actuators' own bounds may move it there
         let mut bounded_sum = T::select(below, low, sum.min(high));
-        for i in &range.actuators {
+        for i in range.actuators.iter().filter(|i| sim.actuators[**i].force.is_some()) {
             let force = force_and_slope(group, forces, *i, &sim.actuators[*i]).0 * share;
             bounded_sum += clamp(force, sim.actuators[*i].force) - force;
         }

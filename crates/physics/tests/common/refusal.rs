@@ -4,10 +4,21 @@
 use marathon_physics::Model;
 
 /// Checks that a model with files is refused by a message with these parts.
+#[track_caller]
 pub fn names(xml: &str, files: &dyn Fn(&str) -> Result<Vec<u8>, String>, parts: &[&str]) {
-    let message = Model::from_xml_str_with(xml, "bad.xml", files).unwrap_err().to_string();
+    has(&Model::from_xml_str_with(xml, "bad.xml", files).unwrap_err().to_string(), parts, xml);
+}
+
+/// The same of a model without files.
+#[track_caller]
+pub fn check(xml: &str, parts: &[&str]) {
+    has(&message(xml), parts, xml);
+}
+
+#[track_caller]
+fn has(message: &str, parts: &[&str], xml: &str) {
     for part in parts {
-        assert!(message.contains(part), "'{part}' is missing in {message}");
+        assert!(message.contains(part), "'{part}' is missing in\n  {message}\nfor\n  {xml}");
     }
 }
 
@@ -16,14 +27,6 @@ pub fn message(xml: &str) -> String {
     match Model::from_xml_str(xml, "bad.xml") {
         Ok(_) => panic!("accepted: {xml}"),
         Err(error) => error.to_string(),
-    }
-}
-
-#[track_caller]
-pub fn check(xml: &str, parts: &[&str]) {
-    let message = message(xml);
-    for part in parts {
-        assert!(message.contains(part), "'{part}' is missing in\n  {message}\nfor\n  {xml}");
     }
 }
 

@@ -81,7 +81,7 @@ crate::options! {
         /// feet, as on wheels.
         feet: String = AUTO.into(),
         /// Stiffness of the servos that replace motors, as a multiple of their largest torque per radian. `auto`: 2, or 4 on two
-        /// feet and if a robot with three feet or more cannot stand with 2. 0 keeps the motors: their torque is the action.
+        /// feet. A robot with three feet or more also has 4 if it cannot stand with 2. 0 keeps the motors: their torque is the action.
         stiffness: Auto = Auto(None),
         /// Change of a servo's target by an action of 1, rad. `auto`: the change that takes half of the largest torque, between
         /// 0.15 and 0.6; 0.6 on two feet, if servos replace motors.

@@ -137,16 +137,17 @@ impl Rig {
                     "its model has no actuators; add <motor> or <position> elements for its joints".into(),
                 ));
             }
-            let quickest = 0.5 / (model.opt.timestep * edits::frame_skip(&model) as f64);
-            if let Some(rate) = arguments.step_rate.0.filter(|rate| *rate > quickest) {
-                return Err(wrong(format!(
-                    "step_rate is {rate}, expected at most {quickest}, half of the decisions per second"
-                )));
-            }
             // the numbers of geoms have changed with the ground
             let stance = stance::stand(&model, root, first.qpos.clone(), &arguments.feet).map_err(wrong)?;
             let changes = Changes { pose: pose.clone(), replaced, hardened };
-            Ok(Self::found(arguments, source(spec), model, root, stance, changes))
+            let rig = Self::found(arguments, source(spec), model, root, stance, changes);
+            let quickest = 0.5 / rig.dt();
+            match arguments.step_rate.0.filter(|rate| *rate > quickest) {
+                Some(rate) => Err(wrong(format!(
+                    "step_rate is {rate}, expected at most {quickest}, half of the decisions per second"
+                ))),
+                None => Ok(rig),
+            }
         };
         let stiffness = STIFFNESS[usize::from(first.feet.len() == BIPED)];
         let rig = with_servos(arguments.stiffness.or(stiffness))?;

@@ -90,20 +90,21 @@ pub fn root(model: &Model) -> Result<(usize, Root), String> {
 /// The standing pose, where it comes from, and whether the model's author has chosen it. `name`: the keyframe, or `auto`.
 pub fn pose(model: &Model, name: &str) -> Result<(Vec<f64>, String, bool), String> {
     let key = |name: &str| model.keyframes.iter().find(|key| key.name == name);
-    if name != AUTO && name != REFERENCE {
+    let unknown = || {
         let known: Vec<&str> =
             model.keyframes.iter().map(|key| key.name.as_str()).filter(|name| !name.is_empty()).collect();
         let known = match known.as_slice() {
             [] => "; the model has no keyframes with names".to_owned(),
             known => format!(" or a keyframe of the model: {}", known.join(", ")),
         };
-        return key(name)
-            .map(|key| (key.qpos.clone(), format!("keyframe '{name}'"), true))
-            .ok_or_else(|| format!("pose is '{name}', expected auto, reference{known}"));
-    }
-    let keyframes = if name == AUTO { &model.keyframes[..] } else { &[] };
-    let key = |name: &str| keyframes.iter().find(|key| key.name == name);
-    if let Some(found) = POSES.iter().find_map(|name| key(name)).or(keyframes.first()) {
+        format!("pose is '{name}', expected auto, reference{known}")
+    };
+    let chosen = match name {
+        AUTO => POSES.iter().find_map(|name| key(name)).or(model.keyframes.first()),
+        REFERENCE => None,
+        name => Some(key(name).ok_or_else(unknown)?),
+    };
+    if let Some(found) = chosen {
         return Ok((found.qpos.clone(), format!("keyframe '{}'", found.name), true));
     }
     let given = model.numerics.iter().find(|(name, qpos)| name == INIT_QPOS && qpos.len() == model.nq);
@@ -203,10 +204,8 @@ pub fn is_wheel(model: &Model, pose: &Pose, body: usize) -> bool {
             GeomType::Sphere | GeomType::Ellipsoid => centered,
             GeomType::Cylinder => centered && (turn(pose, geom) * DVec3::Z).dot(axis).abs() > LEVEL,
             GeomType::Mesh => geom.hull.is_some_and(|hull| {
-                let place = |v: &[f64; 3]| {
-                    pose.point(geom.body, DVec3::from_array(geom.pos)) + turn(pose, geom) * DVec3::from_array(*v)
-                };
-                is_round(model.hulls[hull].vertices.iter().map(place), pose.anchors[joint], axis)
+                let turn = turn(pose, geom);
+                is_round(model.hulls[hull].vertices.iter().map(|v| off + turn * DVec3::from_array(*v)), axis)
             }),
             _ => false,
         }
@@ -215,15 +214,14 @@ pub fn is_wheel(model: &Model, pose: &Pose, body: usize) -> bool {
     geoms.peek().is_some() && geoms.all(rolls)
 }
 
-/// Whether points reach equally far from an axis in all directions across it.
-fn is_round(points: impl Iterator<Item = DVec3>, anchor: DVec3, axis: DVec3) -> bool {
+/// Whether points, given from a place on an axis, reach equally far from it in all directions across.
+fn is_round(points: impl Iterator<Item = DVec3>, axis: DVec3) -> bool {
     let (u, v) = axis.any_orthonormal_pair();
     let mut reach = [0.0f64; DIRECTIONS];
     for point in points {
-        let off = point - anchor;
         for (i, reach) in reach.iter_mut().enumerate() {
             let (sin, cos) = libm::sincos(std::f64::consts::TAU * i as f64 / DIRECTIONS as f64);
-            *reach = reach.max(off.dot(u) * cos + off.dot(v) * sin);
+            *reach = reach.max(point.dot(u) * cos + point.dot(v) * sin);
         }
     }
     let (least, most) = reach.iter().fold((f64::INFINITY, 0.0f64), |(a, b), x| (a.min(*x), b.max(*x)));
@@ -277,8 +275,8 @@ pub fn stand(model: &Model, root: (usize, Root), mut qpos: Vec<f64>, names: &str
         NO_FEET => Vec::new(),
         names => names.split(',').map(|name| named_foot(model, name.trim())).collect::<Result<_, _>>()?,
     };
-    if let Some(twice) = ends.iter().enumerate().find(|(i, b)| ends[..*i].contains(b)) {
-        return Err(format!("feet has '{}' twice", model.bodies[*twice.1].name));
+    if let Some((_, twice)) = ends.iter().enumerate().find(|(i, b)| ends[..*i].contains(b)) {
+        return Err(format!("feet has '{}' twice", model.bodies[*twice].name));
     }
     let mut feet = Vec::new();
     for b in ends {
