@@ -614,6 +614,9 @@ class Model:
     def nu(self) -> int:
         """Number of actuators."""
     @property
+    def mocap_bodies(self) -> npt.NDArray[np.int64]:
+        """Indices of the mocap bodies, which `Simulation.set_mocap` moves, ``(nmocap,)``."""
+    @property
     def body_names(self) -> list[str]:
         """Names of the bodies, the first being the world."""
     @property
@@ -755,7 +758,7 @@ class Simulation:
 
         The states are rows of `qpos`, ``(num_envs, nq)``, and `qvel`, ``(num_envs, nv)``, and the activations of
         actuators those of `act`, ``(num_envs, na)``, or 0. Quaternions are normalized. Controls, pushes and contacts
-        are forgotten.
+        are forgotten, and mocap bodies are put where the model has them.
         """
     def push(
         self,
@@ -775,6 +778,24 @@ class Simulation:
             body: the body's name, or its index in ``model.body_names``.
             mask: the agents, booleans, ``(num_envs,)``; None means all.
         """
+    def set_mocap(
+        self,
+        pos: npt.ArrayLike | None = None,
+        quat: npt.ArrayLike | None = None,
+        *,
+        body: int | str,
+        mask: npt.ArrayLike | None = None,
+    ) -> None:
+        """Move a mocap body of all agents or those of a mask until changed or until a reset.
+
+        It moves at once, without a velocity, and with it all that is attached to it. What is omitted stays.
+
+        Args:
+            pos: its position, m, ``(num_envs, 3)``.
+            quat: its orientation, w x y z, ``(num_envs, 4)``, which is normalized.
+            body: the body's name, or its index in ``model.body_names``.
+            mask: the agents, booleans, ``(num_envs,)``; None means all.
+        """
     def vary(
         self,
         *,
@@ -786,7 +807,8 @@ class Simulation:
     ) -> None:
         """Set constants of all agents or those of a mask, for domain randomization.
 
-        They last over resets, until changed, and belong to snapshots. Omitted constants have the model's values.
+        They last over resets, until changed, and belong to snapshots. Omitted constants have the model's values. Masses
+        change the softness of limits and contacts, too, as MuJoCo's ``mj_setConst`` does.
 
         Args:
             mass: factors of the bodies' masses and inertias, ``(num_envs, nbody)``.
@@ -834,6 +856,12 @@ class Simulation:
     @property
     def act(self) -> npt.NDArray[np.float64]:
         """Activations of the actuators that have one, ``(num_envs, na)``."""
+    @property
+    def mocap_pos(self) -> npt.NDArray[np.float64]:
+        """Positions of the mocap bodies, m, ``(num_envs, nmocap, 3)``, in the order of ``model.mocap_bodies``."""
+    @property
+    def mocap_quat(self) -> npt.NDArray[np.float64]:
+        """Orientations of the mocap bodies, w x y z, ``(num_envs, nmocap, 4)``."""
     @property
     def qacc(self) -> npt.NDArray[np.float64]:
         """Accelerations at the present state and controls, ``(num_envs, nv)``.

@@ -97,6 +97,88 @@ def test_act_is_checked() -> None:
     assert sim.act.tolist() == [[0.0]]
 
 
+HAND = """
+<mujoco model="hand">
+  <option timestep="0.002" iterations="80" tolerance="1e-12"/>
+  <worldbody>
+    <geom name="floor" type="plane" size="5 5 1"/>
+    <body name="hand" mocap="true" pos="0 0 0.5"><geom type="box" size="0.05 0.05 0.02" contype="0" conaffinity="0"/></body>
+    <body name="paddle" mocap="true" pos="0.5 0 0.1"><geom name="paddle" type="box" size="0.02 0.2 0.1"/></body>
+    <body name="held" pos="0 0 0.4"><freejoint/><geom name="held" size="0.05"/></body>
+    <body name="puck" pos="0.4 0 0.05"><freejoint/><geom type="box" size="0.05 0.05 0.05"/></body>
+  </worldbody>
+  <equality><weld body1="hand" body2="held"/></equality>
+</mujoco>
+"""
+
+
+def test_mocap_bodies_pull_and_push_as_in_mujoco() -> None:
+    ours = Model.from_xml_string(HAND)
+    assert [ours.body_names[i] for i in ours.mocap_bodies] == ["hand", "paddle"]
+    sim = Simulation(ours, 2, isa="f64")
+    model = mujoco.MjModel.from_xml_string(HAND)
+    data = mujoco.MjData(model)
+    before = np.array(sim.qpos)
+    for i in range(400):
+        hand, turn = [0.2 * i / 400, 0.1, 0.5 + 0.1 * i / 400], [1.0, 0.0, 0.3 * i / 400, 0.0]
+        paddle = [0.5 - 0.15 * i / 400, 0.0, 0.1]
+        # only the second agent's move
+        sim.set_mocap(twice(np.array(hand)), twice(np.array(turn)), body="hand", mask=[False, True])
+        sim.set_mocap(twice(np.array(paddle)), body="paddle", mask=[False, True])
+        data.mocap_pos[:], data.mocap_quat[0] = [hand, paddle], turn
+        sim.step(np.zeros((2, 0)))
+        mujoco.mj_step(model, data)
+        np.testing.assert_allclose(sim.qpos[1], data.qpos, rtol=1e-6, atol=1e-6, err_msg=f"step {i}")
+    assert sim.qpos[1, 0] > 0.1 and sim.qpos[1, 7] < 0.32  # pulled, pushed
+    np.testing.assert_allclose(sim.qpos[0, 7:9], before[0, 7:9], atol=1e-3)  # the first agent's puck stands
+    unit = data.mocap_quat / np.linalg.norm(data.mocap_quat, axis=1, keepdims=True)
+    np.testing.assert_allclose(sim.mocap_pos[1], data.mocap_pos)
+    np.testing.assert_allclose(sim.mocap_quat[1], unit)
+    snapshot, pose = sim.save(), np.array(sim.body_pos)
+    sim.reset(before, np.zeros_like(sim.qvel))
+    assert sim.mocap_pos[1, 0].tolist() == [0.0, 0.0, 0.5]
+    sim.load(snapshot)
+    np.testing.assert_array_equal(sim.body_pos, pose)
+
+
+def test_wrong_mocap_targets_say_what_is_right() -> None:
+    sim = Simulation(Model.from_xml_string(HAND), 2)
+    here = np.zeros((2, 3))
+    with pytest.raises(ValueError, match="body 'held' is no mocap body; those of the model are 'hand', 'paddle'"):
+        sim.set_mocap(here, body="held")
+    with pytest.raises(ValueError, match="pos has the shape"):
+        sim.set_mocap(np.zeros((3, 3)), body="hand")
+    with pytest.raises(ValueError, match="agent 1: pos is nan, expected finite numbers"):
+        sim.set_mocap([[0, 0, 0], [0, np.nan, 0]], body="hand")
+    with pytest.raises(ValueError, match="agent 0: quat is zero, expected a rotation, w x y z"):
+        sim.set_mocap(quat=np.zeros((2, 4)), body="hand")
+    assert sim.mocap_pos[0, 0].tolist() == [0.0, 0.0, 0.5]  # nothing changed
+    none = Simulation(Model.from_xml_string(MODEL), 1)
+    with pytest.raises(ValueError, match="body 'arm' is no mocap body; the model has none"):
+        none.set_mocap(np.zeros((1, 3)), body="arm")
+
+
+def test_a_control_must_be_a_number() -> None:
+    sim = Simulation(Model.from_xml_string(MODEL), 2)
+    with pytest.raises(ValueError, match="agent 1: ctrl of actuator 1 'turn' is NaN, expected a number"):
+        sim.step([[0.0, 0.0], [0.0, np.nan]])
+
+
+def test_masses_change_the_softness_of_constraints_as_in_mujoco() -> None:
+    sim = Simulation(Model.from_xml_string(MODEL), 2, isa="f64")
+    model = mujoco.MjModel.from_xml_string(MODEL)
+    factors = np.array([1.0, 2.0, 0.5, 3.0])
+    sim.vary(mass=np.stack([np.ones(4), factors]))
+    model.body_mass[:] *= factors
+    model.body_inertia[:] *= factors[:, None]
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    data = mujoco.MjData(model)
+    for i in range(300):
+        sim.step(np.zeros((2, 2)))
+        mujoco.mj_step(model, data)
+        np.testing.assert_allclose(sim.qpos[1], data.qpos, rtol=1e-5, atol=1e-5, err_msg=f"step {i}")
+
+
 def test_the_settings_are_those_of_the_file() -> None:
     option = Model.from_xml_string(MODEL).option
     theirs = mujoco.MjModel.from_xml_string(MODEL).opt
@@ -124,6 +206,12 @@ def test_an_edited_model_is_that_of_the_edited_file(tmp_path: Path) -> None:
         assert (model.timestep, model.nu) == (0.002, 2)
         again = edited.edit({"option": {"timestep": 0.002}})
         assert again.timestep == 0.002 and again.nu == 1
+
+
+@pytest.mark.parametrize("kinds", [["body", "geom"], ["geom", "body"]])
+def test_elements_are_removed_in_any_order(kinds: list[str]) -> None:
+    edited = Model.from_xml_string(MODEL).edit(remove={kind: ["die"] for kind in kinds})
+    assert edited.body_names == ["world", "arm", "ball"] and edited.geom_names == ["floor", "arm", "ball"]
 
 
 def test_a_wrong_edit_says_what_is_right() -> None:

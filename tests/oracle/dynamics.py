@@ -120,7 +120,8 @@ def vary(model, rng, original):
     factor = lambda n, low, high: rng.uniform(low, high, n).astype(np.float32).astype(np.float64)
     mass = factor(model.nbody, 0.5, 2.0)
     for b in range(model.nbody):
-        mass[b] = mass[model.body_weldid[b]]
+        weld = model.body_weldid[b]
+        mass[b] = mass[weld] if model.body_dofnum[weld] else 1.0
     friction = float(factor(1, 0.3, 1.5)[0])
     strength = factor(model.nu, 0.5, 1.5)
     gravity = (original.opt.gravity + factor(3, -1.0, 1.0)).astype(np.float32).astype(np.float64)
@@ -140,12 +141,24 @@ def vary(model, rng, original):
     model.actuator_biasprm[:, :3] = original.actuator_biasprm[:, :3] * strength[:, None]
     model.actuator_forcerange[:] = original.actuator_forcerange * strength[:, None]
     model.opt.gravity[:] = gravity
+    # inverse weights of the new masses; masses alone, since lengths at rest are those of the model
+    mujoco.mj_setConst(model, mujoco.MjData(model))
     return {
         "mass": mass.tolist(),
         "friction": friction,
         "strength": strength.tolist(),
         "gravity": gravity.tolist(),
     }
+
+
+def draw_mocaps(model, rng):
+    """Poses of the mocap bodies near those of the model: position and quaternion, a row per body."""
+    poses = np.zeros((model.nmocap, 7))
+    for body in np.flatnonzero(model.body_mocapid >= 0):
+        quat = model.body_quat[body] + 0.2 * rng.normal(size=4)
+        poses[model.body_mocapid[body], :3] = model.body_pos[body] + 0.1 * rng.normal(size=3)
+        poses[model.body_mocapid[body], 3:] = quat / np.linalg.norm(quat)
+    return poses.astype(np.float32).astype(np.float64)
 
 
 def deep_in_field(model, data):
@@ -186,8 +199,10 @@ def run(job):
             mujoco.mj_resetData(model, data)
             data.qpos[:], data.qvel[:], data.ctrl[:], data.act[:] = q, v, u, act
             data.xfrc_applied[:] = push
+            data.mocap_pos[:], data.mocap_quat[:] = mocap[:, :3], mocap[:, 3:]
 
         own = vary(model, rng, original) if job.get("vary") else None
+        mocap = draw_mocaps(model, rng)
         restart()
         mujoco.mj_forward(model, data)
         mujoco.mj_rnePostConstraint(model, data)
@@ -196,6 +211,7 @@ def run(job):
             "deep": deep_in_field(model, data),
             "act": act.tolist(),
             "xfrc": push.ravel().tolist(),
+            "mocap": mocap.tolist(),
             "qpos": q.tolist(),
             "qvel": v.tolist(),
             "ctrl": u.tolist(),

@@ -62,7 +62,8 @@ def random_state(model, rng):
     act = rng.uniform(-0.5, 0.5, model.na)
     push = rng.normal(size=(model.nbody, 6)) if rng.random() < 0.2 else np.zeros((model.nbody, 6))
     push[0] = 0
-    return [x.astype(np.float32).astype(np.float64) for x in (q, v, u, act, push)]
+    mocap = dynamics.draw_mocaps(model, rng)
+    return [x.astype(np.float32).astype(np.float64) for x in (q, v, u, act, push, mocap)]
 
 
 def tightened(model):
@@ -74,15 +75,19 @@ def tightened(model):
     return model
 
 
-def forward(model, data, state):
+def place(model, data, state):
     put(model, data, state[:4])
     data.xfrc_applied[:] = state[4]
+    data.mocap_pos[:], data.mocap_quat[:] = state[5][:, :3], state[5][:, 3:]
+
+
+def forward(model, data, state):
+    place(model, data, state)
     mujoco.mj_forward(model, data)
 
 
 def step(model, data, state):
-    put(model, data, state[:4])
-    data.xfrc_applied[:] = state[4]
+    place(model, data, state)
     mujoco.mj_step(model, data)
     return np.concatenate([data.qpos, data.qvel, data.act])
 
@@ -127,7 +132,7 @@ def weightless(model, data):
 def answer(model, data, state, rng):
     """Return MuJoCo's results for a state, or the reason why it has no definite answer."""
     forward(model, data, state)
-    acc, contacts = data.qacc.copy(), data.ncon
+    acc, constraint, contacts = data.qacc.copy(), data.qfrc_constraint.copy(), data.ncon
     if warned(data) or not np.isfinite(acc).all() or np.abs(acc).max(initial=0.0) > LARGEST_ACCELERATION:
         return "too fast"
     if dynamics.deep_in_field(model, data):
@@ -150,11 +155,13 @@ def answer(model, data, state, rng):
     single = all(changes(SINGLE_NUDGE) < SINGLE_CHANGE for _ in range(3))
     # single precision rounds within the step, too: forces that cancel leave nothing of its digits
     noises, own = [], np.random.default_rng(0)
-    for _ in range(4):
+    for _ in range(8):
         nudged = moved(model, state, own, LAST_DIGIT)
-        if not converges(model.opt):
-            single &= COARSER * relative(step(model, data, nudged), after) < SINGLE_CHANGE
+        change = relative(step(model, data, nudged), after)
         forward(model, data, nudged)
+        if not converges(model.opt):
+            change = max(change, relative(data.qfrc_constraint, constraint))
+            single &= COARSER * change < SINGLE_CHANGE
         noises.append(data.sensordata.copy())
     sensors = []
     for by in [NUDGE, -NUDGE]:
@@ -177,10 +184,10 @@ def answer(model, data, state, rng):
         # contacts without force are counted by MuJoCo's sensors and not by ours
         for kind, start, count in zip(model.sensor_type, model.sensor_adr, model.sensor_dim):
             jumps[0][start : start + count] |= mujoco.mjtSensor(kind) == mujoco.mjtSensor.mjSENS_CONTACT
-    q, v, u, act, push = state
+    q, v, u, act, push, mocap = state
     nq, nv = model.nq, model.nv
     return {
-        "qpos": q, "qvel": v, "ctrl": u, "act": act, "xfrc": push.ravel(), "single": bool(single),
+        "qpos": q, "qvel": v, "ctrl": u, "act": act, "xfrc": push.ravel(), "single": bool(single), "mocap": mocap,
         "weightless": weightless(model, data),
         "qacc": data.qacc, "qfrc_constraint": data.qfrc_constraint, "qfrc_bias": data.qfrc_bias,
         "qfrc_applied": data.qfrc_passive + data.qfrc_actuator + dynamics.pushed(model, data),
@@ -241,7 +248,8 @@ def judge(entry):
     states, _ = states_of(model, entry["seed"], entry["states"])
     s = states[entry["state"]]
     data = mujoco.MjData(model)
-    state = [np.array(s[k]) for k in ["qpos", "qvel", "ctrl", "act"]] + [np.array(s["xfrc"]).reshape(-1, 6)]
+    state = [np.array(s[k]) for k in ["qpos", "qvel", "ctrl", "act"]]
+    state += [np.array(s["xfrc"]).reshape(-1, 6), np.array(s["mocap"]).reshape(-1, 7)]
     forward(model, data, state)
     return {"ours": gradient(model, data, np.array(entry["qacc"])), "mujoco": gradient(model, data, np.array(s["qacc"]))}
 

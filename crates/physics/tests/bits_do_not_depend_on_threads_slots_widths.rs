@@ -4,7 +4,7 @@
 //! vector register, any number of agents, any slot, and any number of threads and lanes. The agents of this test start
 //! differently, so a group always holds standing, falling and lying ones. They run long enough to reach every branch of
 //! the solver. All features are on: contacts between moving bodies, elliptic cones, terrain, convex shapes, equality constraints,
-//! tendons, activations, pushes, and each agent's own constants and ground.
+//! tendons, activations, pushes, mocap bodies, and each agent's own constants and ground.
 
 mod common;
 
@@ -52,6 +52,14 @@ fn run(model: &Model, ids: &[usize], threads: usize, isa: Isa, decisions: usize)
     for t in 0..decisions {
         let ctrl: Vec<f64> =
             ids.iter().flat_map(|&id| (0..model.nu).map(move |u| noise(id, 1000 + t * 64 + u))).collect();
+        for (slot, &id) in ids.iter().enumerate().filter(|(_, id)| (**id + t) % 3 == 0) {
+            for (k, body) in model.mocap_bodies().enumerate() {
+                let pos = model.bodies[body].pos.map(|x| x + 0.05 * noise(id, 600 + t));
+                let mut quat = model.bodies[body].quat;
+                quat[1] += 0.1 * noise(id, 700 + t);
+                batch.set_mocap(slot, k, &pos, &quat);
+            }
+        }
         assert!(batch.step(&ctrl, 10).is_empty(), "{}: the trajectory stays finite", model.name);
         for (slot, o) in out.iter_mut().enumerate() {
             o.extend(batch.qpos(slot).iter().chain(&batch.qvel(slot)).map(|x| x.to_bits()));
@@ -76,6 +84,7 @@ fn models() -> Vec<Model> {
         "full/actuators_implicitfast",
         "full/actuators_rk4",
         "full/medium",
+        "full/mocap",
         "convex/heap",
         "convex/arm_of_meshes",
     ]

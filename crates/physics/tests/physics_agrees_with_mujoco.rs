@@ -110,6 +110,9 @@ fn compare<T: Real>(model: &Model, states: &[Value], ground_contacts_only: bool)
             if !s["own"].is_null() {
                 group.vary(&sim, i, &Variation::deserialize(&s["own"]).expect("a variation"));
             }
+            for (k, x) in s["mocap"].as_array().expect("a list").iter().map(numbers).enumerate() {
+                group.set_mocap(i, k, &[x[0], x[1], x[2]], &[x[3], x[4], x[5], x[6]]);
+            }
             for (body, x) in numbers(&s["xfrc"]).chunks(6).enumerate().filter(|(_, x)| x.iter().any(|x| *x != 0.0)) {
                 group.push(&sim, i, body, [x[0], x[1], x[2]], [x[3], x[4], x[5]]);
             }
@@ -276,6 +279,11 @@ fn physics_agrees_with_mujoco() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
+/// Factor for models in which single precision loses digits: forces within a link mostly cancel, and a weld measures a small angle.
+fn slack(path: &Path) -> f64 {
+    if ["springs.xml", "mocap.xml"].iter().any(|name| path.ends_with(name)) { 10.0 } else { 1.0 }
+}
+
 #[test]
 fn everything_at_once_agrees_with_mujoco() {
     let suite = common::package("dm_control").join("suite");
@@ -300,9 +308,7 @@ fn everything_at_once_agrees_with_mujoco() {
     let answers = common::oracle("dynamics.py", &Value::Array(jobs));
     let mut failures = Vec::new();
     for (path, answer) in paths.iter().zip(answers.as_array().expect("a list")) {
-        // forces within a link mostly cancel
-        let slack = if path.ends_with("springs.xml") { 10.0 } else { 1.0 };
-        let bars = Bars { double: 1e-8, median: 5e-6 * slack, max: 1e-2, contacts: 0 };
+        let bars = Bars { double: 1e-8, median: 5e-6 * slack(path), max: 1e-2, contacts: 0 };
         check(path, answer, false, &bars, &mut failures);
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
@@ -311,8 +317,20 @@ fn everything_at_once_agrees_with_mujoco() {
 #[test]
 fn varied_agents_agree_with_an_edited_mujoco_model() {
     let root = common::workspace();
-    let full = ["pile", "pyramidal", "elliptic", "tendons", "actuators", "medium", "equality"]
-        .map(|n| format!("crates/physics/tests/models/full/{n}.xml"));
+    let full = [
+        "pile",
+        "pyramidal",
+        "elliptic",
+        "tendons",
+        "actuators",
+        "medium",
+        "equality",
+        "springs",
+        "strings",
+        "terrain",
+        "mocap",
+    ]
+    .map(|n| format!("crates/physics/tests/models/full/{n}.xml"));
     let agents = ["hopper", "ant", "humanoid"].map(|n| format!("assets/agents/{n}.xml"));
     let paths: Vec<PathBuf> = full.iter().chain(&agents).map(|p| root.join(p)).collect();
     let job = |(i, p): (usize, &PathBuf)| {
@@ -327,7 +345,9 @@ fn varied_agents_agree_with_an_edited_mujoco_model() {
     let answers = common::oracle("dynamics.py", &Value::Array(jobs));
     let mut failures = Vec::new();
     for (path, answer) in paths.iter().zip(answers.as_array().expect("a list")) {
-        let bars = Bars { double: 1e-8, median: 5e-6, max: 1e-2, contacts: 0 };
+        // in one state of this model, double precision loses five digits, too
+        let max = if path.ends_with("elliptic.xml") { 1e-1 } else { 1e-2 };
+        let bars = Bars { double: 1e-8, median: 5e-6 * slack(path), max, contacts: 0 };
         check(path, answer, false, &bars, &mut failures);
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));

@@ -71,6 +71,8 @@ struct State {
     ctrl: Vec<f64>,
     act: Vec<f64>,
     xfrc: Vec<f64>,
+    /// Positions and orientations of the mocap bodies.
+    mocap: Vec<[f64; 7]>,
     /// Whether rounding to single precision hardly changes the answer.
     single: bool,
     /// A constraint acts on bodies that only turn about their centers of mass, or a weld on those that only slide.
@@ -112,6 +114,9 @@ fn ours<T: Real>(sim: &Sim<T>, work: &mut Work<T>, state: &State) -> Quantities 
     }
     for (a, x) in group.act.iter_mut().zip(&state.act) {
         a.set(0, T::scalar(*x));
+    }
+    for (k, [x, y, z, quat @ ..]) in state.mocap.iter().enumerate() {
+        group.set_mocap(0, k, &[*x, *y, *z], quat);
     }
     for (body, x) in state.xfrc.chunks(6).enumerate().filter(|(_, x)| x.iter().any(|x| *x != 0.0)) {
         group.push(sim, 0, body, [x[0], x[1], x[2]], [x[3], x[4], x[5]]);

@@ -9,7 +9,7 @@ fn a_restored_batch_has_the_same_future() {
     for file in ["assets/agents/humanoid.xml", "crates/physics/tests/models/full/pile.xml"] {
         check(file);
     }
-    for name in ["terrain", "equality", "tendons", "actuators", "medium", "elliptic"] {
+    for name in ["terrain", "equality", "tendons", "actuators", "medium", "elliptic", "mocap"] {
         check(&format!("crates/physics/tests/models/full/{name}.xml"));
     }
 }
@@ -24,6 +24,9 @@ fn check(file: &str) {
     own.friction = 0.7;
     batch.vary(3, &own);
     batch.push(4, 1, [1.0, 0.5, 0.2], [0.0, 0.1, 0.0]);
+    for (k, body) in model.mocap_bodies().enumerate() {
+        batch.set_mocap(6, k, &model.bodies[body].pos.map(|x| x + 0.1), &[2.0, 0.1, 0.0, 0.0]);
+    }
     for (field, h) in model.hfields.iter().enumerate() {
         let elevations: Vec<f32> = (0..h.data.len()).map(|k| 0.01 * k as f32).collect();
         batch.set_ground(5, field, &elevations);

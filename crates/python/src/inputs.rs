@@ -22,6 +22,64 @@ pub struct Pushes {
     pub each: Vec<(usize, [f64; 3], [f64; 3])>,
 }
 
+/// Poses of one mocap body of each selected agent.
+pub struct MocapPoses {
+    /// Its number among the mocap bodies.
+    pub mocap: usize,
+    /// Agent, position, m, and orientation.
+    pub each: Vec<(usize, [f64; 3], [f64; 4])>,
+}
+
+/// Reads the arguments of `set_mocap` for the agents whose mocap bodies have the poses `present`, `[agent][mocap]`.
+pub fn mocap_poses(
+    model: &Model,
+    (n, present): (usize, (&[f64], &[f64])),
+    pos: Given<'_, '_>,
+    quat: Given<'_, '_>,
+    body: &Bound<'_, PyAny>,
+    mask: Given<'_, '_>,
+) -> PyResult<MocapPoses> {
+    let (body, chosen) = (model.body_index(body)?, self::mask(mask, n)?);
+    let bodies: Vec<usize> = model.inner.mocap_bodies().collect();
+    let Some(mocap) = bodies.iter().position(|b| *b == body) else {
+        let name = |b: &usize| format!("'{}'", model.inner.bodies[*b].name);
+        let valid = match bodies.len() {
+            0 => "the model has none".to_owned(),
+            _ => format!("those of the model are {}", bodies.iter().map(name).collect::<Vec<_>>().join(", ")),
+        };
+        return Err(error::value(format!("body {} is no mocap body; {valid}", name(&body))));
+    };
+    let (of_pos, of_quat) = present;
+    let row = |agent: usize| agent * bodies.len() + mocap;
+    let mut each: Vec<(usize, [f64; 3], [f64; 4])> = Vec::new();
+    for agent in (0..n).filter(|agent| chosen[*agent]) {
+        let [p, q] = [3 * row(agent), 4 * row(agent)];
+        each.push((agent, [of_pos[p], of_pos[p + 1], of_pos[p + 2]], [0, 1, 2, 3].map(|i| of_quat[q + i])));
+    }
+    let finite = |agent: usize, name: &str, numbers: &[f64]| match numbers.iter().find(|x| !x.is_finite()) {
+        Some(x) => Err(error::value(format!("agent {agent}: {name} is {x}, expected finite numbers"))),
+        None => Ok(()),
+    };
+    if let Some(pos) = pos {
+        let pos = of_shape::<f64, Ix2, 2>("pos has", pos, [n, 3])?;
+        for (agent, own, _) in &mut each {
+            *own = [0, 1, 2].map(|i| pos.as_array()[[*agent, i]]);
+            finite(*agent, "pos", own)?;
+        }
+    }
+    if let Some(quat) = quat {
+        let quat = of_shape::<f64, Ix2, 2>("quat has", quat, [n, 4])?;
+        for (agent, _, own) in &mut each {
+            *own = [0, 1, 2, 3].map(|i| quat.as_array()[[*agent, i]]);
+            finite(*agent, "quat", own)?;
+            if own.iter().all(|x| x.abs() < 1e-10) {
+                return Err(error::value(format!("agent {agent}: quat is zero, expected a rotation, w x y z")));
+            }
+        }
+    }
+    Ok(MocapPoses { mocap, each })
+}
+
 /// Reads the arguments of `push` for `n` agents.
 pub fn pushes(
     model: &Model,

@@ -93,6 +93,12 @@ impl Model {
         self.inner.nu
     }
 
+    /// Indices of the mocap bodies, `(nmocap,)`.
+    #[getter]
+    fn mocap_bodies<'py>(&self, py: Python<'py>) -> Indices<'py> {
+        indices(py, self.inner.mocap_bodies().collect::<Vec<_>>().into_iter())
+    }
+
     /// Names of the bodies, the first being the world.
     #[getter]
     fn body_names(&self) -> Vec<&str> {

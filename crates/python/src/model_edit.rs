@@ -51,6 +51,7 @@ pub fn edited(
             set(&mut spec.get_mut(kind, &name).map_err(invalid)?, &attributes, &place)?;
         }
     }
+    let mut named = Vec::new();
     for (of, names) in remove.into_iter().flat_map(|remove| remove.iter()) {
         let of = text(&of, "a kind of elements")?;
         let kind = kind(&of)?;
@@ -59,7 +60,15 @@ pub fn edited(
             return Err(error::value(format!("remove['{of}'] is a text, expected a list of names")));
         }
         for name in names.try_iter()? {
-            spec.remove(kind, &text(&name?, &format!("the name of a {of}"))?).map_err(invalid)?;
+            let name = text(&name?, &format!("the name of a {of}"))?;
+            spec.get(kind, &name).map_err(invalid)?;
+            named.push((kind, name));
+        }
+    }
+    for (kind, name) in named {
+        // an element that was removed before may have taken this one along
+        if spec.get(kind, &name).is_ok() {
+            spec.remove(kind, &name).map_err(invalid)?;
         }
     }
     Ok(spec)

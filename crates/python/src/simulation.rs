@@ -122,8 +122,15 @@ impl Simulation {
             return Err(error::value(format!("substeps is {substeps}, expected 1 to {MOST_SUBSTEPS}")));
         }
         let ctrl = of_shape::<f64, Ix2, 2>("ctrl has", ctrl, [this.num_envs, this.model.get().inner.nu])?;
-        this.read.clear();
         let (ctrl, n) = (rows(&ctrl), this.num_envs);
+        if let Some(at) = ctrl.iter().position(|u| u.is_nan()) {
+            let (agent, actuator) = (at / this.model.get().inner.nu, at % this.model.get().inner.nu);
+            let name = this.model.get().inner.actuators[actuator].name.as_str();
+            return Err(error::value(format!(
+                "agent {agent}: ctrl of actuator {actuator} '{name}' is NaN, expected a number"
+            )));
+        }
+        this.read.clear();
         let batch = this.batch();
         let broken = py.detach(|| batch.step(&ctrl, substeps));
         let mut out = vec![false; n];
@@ -135,7 +142,7 @@ impl Simulation {
 
     /// Puts agents, all or those of a mask, `(num_envs,)`, into the states in the rows of `qpos`, `(num_envs, nq)`, and
     /// `qvel`, `(num_envs, nv)`, with the activations `act`, `(num_envs, na)`, or 0. Quaternions are normalized; controls, pushes and
-    /// contacts are forgotten.
+    /// contacts are forgotten, and mocap bodies are where the model has them.
     #[pyo3(signature = (qpos, qvel, mask = None, *, act = None))]
     fn reset(
         slf: &Bound<'_, Self>,
@@ -184,6 +191,32 @@ impl Simulation {
         this.read.clear();
         for (agent, force, torque) in pushes.each {
             this.batch().push(agent, pushes.body, force, torque);
+        }
+        Ok(())
+    }
+
+    /// Moves a mocap body, given by its index or name, of all agents or those of a mask: its position, m, `(num_envs, 3)`, and its
+    /// orientation, `(num_envs, 4)`. What is omitted stays. It lasts until changed or until a reset.
+    #[pyo3(signature = (pos = None, quat = None, *, body, mask = None))]
+    fn set_mocap(
+        slf: &Bound<'_, Self>,
+        py: Python<'_>,
+        pos: Option<&Bound<'_, PyAny>>,
+        quat: Option<&Bound<'_, PyAny>>,
+        body: &Bound<'_, PyAny>,
+        mask: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let this = &mut *exclusive(slf)?;
+        let model = this.model.clone_ref(py);
+        let inner = &model.get().inner;
+        let size = |quantity: Quantity| vec![0.0; this.num_envs * quantity.width(inner)];
+        let (mut of_pos, mut of_quat) = (size(Quantity::MocapPos), size(Quantity::MocapQuat));
+        this.batch().gather(&mut [(Quantity::MocapPos, &mut of_pos), (Quantity::MocapQuat, &mut of_quat)]);
+        let present = (this.num_envs, (&of_pos[..], &of_quat[..]));
+        let poses = inputs::mocap_poses(model.get(), present, pos, quat, body, mask)?;
+        this.read.clear();
+        for (agent, pos, quat) in poses.each {
+            this.batch().set_mocap(agent, poses.mocap, &pos, &quat);
         }
         Ok(())
     }
@@ -319,6 +352,18 @@ impl Simulation {
         exclusive(slf)?.reading(py, Quantity::Act)
     }
 
+    /// Positions of the mocap bodies, m, `(num_envs, nmocap, 3)`.
+    #[getter]
+    fn mocap_pos(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        exclusive(slf)?.reading(py, Quantity::MocapPos)
+    }
+
+    /// Orientations of the mocap bodies, `(num_envs, nmocap, 4)`.
+    #[getter]
+    fn mocap_quat(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
+        exclusive(slf)?.reading(py, Quantity::MocapQuat)
+    }
+
     /// Accelerations at the present state and controls, `(num_envs, nv)`.
     #[getter]
     fn qacc(slf: &Bound<'_, Self>, py: Python<'_>) -> PyResult<Py<PyAny>> {
@@ -438,7 +483,8 @@ impl Simulation {
 
 /// Upper bound on the memory of an agent with all its readings, bytes.
 fn agent_bytes(model: &marathon_physics::Model) -> f64 {
-    let state = model.nq + 3 * model.nv + 2 * model.nu + model.na + 6 * model.bodies.len();
+    let mocap = 14 * model.mocap_bodies().count();
+    let state = model.nq + 3 * model.nv + 2 * model.nu + model.na + 6 * model.bodies.len() + mocap;
     let frames = 18 * model.bodies.len() + 6 * model.geoms.len();
     let contacts = 6 * model.geoms.len();
     let sensors: usize = model.sensors.iter().map(|sensor| sensor.dim).sum();
@@ -488,6 +534,8 @@ impl Simulation {
         match quantity {
             Quantity::BodyPos | Quantity::BodyVelocity | Quantity::BodyAngularVelocity => vec![n, bodies, 3],
             Quantity::BodyAxes => vec![n, bodies, 3, 3],
+            Quantity::MocapPos => vec![n, model.mocap_bodies().count(), 3],
+            Quantity::MocapQuat => vec![n, model.mocap_bodies().count(), 4],
             Quantity::GeomPos | Quantity::GeomVelocity => vec![n, geoms, 3],
             flat => vec![n, flat.width(model)],
         }

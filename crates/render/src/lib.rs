@@ -31,6 +31,7 @@ mod ground;
 mod image;
 mod kinematics;
 mod light;
+mod mesh;
 mod mp4;
 mod palette;
 mod recorder;

@@ -1,6 +1,7 @@
 //! The contents of a picture: a model's visible geoms, and frames of one or several agents posed from `qpos`.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 use marathon_physics::model::{Geom, GeomType, Model};
@@ -8,6 +9,7 @@ use marathon_physics::model::{Geom, GeomType, Model};
 use crate::error::RenderError;
 use crate::ground::Marks;
 use crate::kinematics::{self, Pose};
+use crate::mesh::Triangles;
 use crate::palette::{self, Side};
 use crate::shape::{Plane, Shape, Solid};
 use crate::terrain::Terrain;
@@ -41,7 +43,9 @@ pub struct Scene {
 #[derive(Clone, Debug)]
 struct Shown {
     geom: usize,
+    /// Of a mesh, its box.
     shape: Shape,
+    mesh: Option<Arc<Triangles>>,
     /// Own color in linear light, or `None` for the palette's.
     color: Option<DVec3>,
     alpha: f64,
@@ -87,26 +91,21 @@ pub struct AgentView {
 impl Scene {
     /// Collects the visible geoms of `model`.
     ///
-    /// It leaves out geoms with alpha 0, and MuJoCo's hidden groups 3 and up, unless every geom of the moving bodies is in
-    /// one of those. A moving body that would show only meshes shows its hidden shapes. Without any simple shape, a body
-    /// shows boxes of the size of its meshes that collide.
+    /// It leaves out geoms with alpha 0, and MuJoCo's hidden groups 3 and up. A moving body that has only hidden geoms shows
+    /// them, and all do where every geom of the moving bodies is hidden. Meshes whose files were not found cannot be shown.
     pub fn new(model: &Model) -> Self {
         let moving = |geom: &Geom| model.bodies.get(geom.body).is_some_and(|body| body.weld_id != 0);
         let opaque = |geom: &Geom| geom.rgba[3] > 0.0;
         let listed = |geom: &Geom| geom.group < FIRST_HIDDEN_GROUP;
         let all_hidden = !model.geoms.iter().any(|geom| moving(geom) && opaque(geom) && listed(geom));
-        // bodies with simple shapes, and those that would show one
-        let (mut simple, mut shows) = (BTreeSet::new(), BTreeSet::new());
-        for geom in model.geoms.iter().filter(|geom| opaque(geom) && geom.kind != GeomType::Mesh) {
-            simple.insert(geom.body);
-            if listed(geom) {
-                shows.insert(geom.body);
-            }
-        }
-        let visible = |geom: &Geom| match geom.kind {
-            GeomType::Mesh => opaque(geom) && !simple.contains(&geom.body),
-            _ => opaque(geom) && (listed(geom) || moving(geom) && (all_hidden || !shows.contains(&geom.body))),
-        };
+        let meshes: Vec<Option<Arc<Triangles>>> =
+            model.meshes.iter().map(|mesh| Triangles::new(mesh).map(Arc::new)).collect();
+        let mesh_of = |geom: &Geom| geom.mesh.and_then(|mesh| meshes[mesh].clone());
+        let known = |geom: &Geom| geom.kind != GeomType::Mesh || mesh_of(geom).is_some();
+        let drawn = |geom: &&Geom| opaque(geom) && listed(geom) && known(geom);
+        let shows: BTreeSet<usize> = model.geoms.iter().filter(drawn).map(|geom| geom.body).collect();
+        let visible =
+            |geom: &Geom| opaque(geom) && (listed(geom) || moving(geom) && (all_hidden || !shows.contains(&geom.body)));
 
         let tree = model.joints.first().and_then(|joint| model.bodies.get(joint.body)).map(|body| body.root_id);
         let rest = kinematics::pose(model, &model.qpos0, 0).ok();
@@ -118,7 +117,8 @@ impl Scene {
                 planes.push(ShownPlane { geom: index, half: [geom.size[0], geom.size[1]] });
             } else if geom.kind == GeomType::Hfield {
                 fields.push(index);
-            } else if let Some(shape) = shape_of(geom) {
+            } else if let Some(shape) = shape_of(geom, mesh_of(geom).as_deref()) {
+                let mesh = mesh_of(geom);
                 let color = (geom.rgba != UNCHOSEN).then(|| {
                     let [r, g, b, _] = geom.rgba.map(f64::from);
                     DVec3::new(palette::to_linear(r), palette::to_linear(g), palette::to_linear(b))
@@ -126,7 +126,7 @@ impl Scene {
                 let alpha = f64::from(geom.rgba[3]).min(1.0);
                 let runner = moving(geom) && model.bodies.get(geom.body).map(|body| body.root_id) == tree;
                 let side = side_of(model, geom, rest.as_ref().map(|pose| pose.geoms[index].pos[1]));
-                shown.push(Shown { geom: index, shape, color, alpha, side, moving: moving(geom), runner });
+                shown.push(Shown { geom: index, shape, mesh, color, alpha, side, moving: moving(geom), runner });
             }
         }
 
@@ -273,9 +273,8 @@ impl Scene {
     fn add_ghost(&self, frame: &mut Frame, offset: DVec3, pose: &Pose, place: GhostPlace) {
         let share = if place == GhostPlace::Inside { GHOST_ALPHA } else { 1.0 };
         for shown in self.shown.iter().filter(|shown| shown.runner) {
-            let (pos, rot) = placed(pose, shown.geom);
             let color = palette::sided(palette::linear(palette::GHOST), shown.side);
-            let solid = Solid::new(shown.shape, pos + offset, rot, color, share * shown.alpha);
+            let solid = shown.solid(pose, offset, color, share * shown.alpha);
             frame.solids.push(Solid { ghost: true, ..solid });
         }
     }
@@ -284,7 +283,6 @@ impl Scene {
         // overlaid agents share one world
         let repeat_world = agent == 0 || self.spacing != 0.0;
         for shown in self.shown.iter().filter(|shown| shown.moving || repeat_world) {
-            let (pos, rot) = placed(pose, shown.geom);
             let color = match (shown.color, shown.moving) {
                 // a model with a single color gets the palette's colors to distinguish agents in a row
                 (Some(_), true) if self.one_color && agent > 0 => palette::agent(agent, shown.side),
@@ -293,7 +291,7 @@ impl Scene {
                 (None, true) => palette::agent(agent, shown.side),
                 (None, false) => palette::linear(palette::WORLD),
             };
-            frame.solids.push(Solid::new(shown.shape, pos + offset, rot, color, shown.alpha));
+            frame.solids.push(shown.solid(pose, offset, color, shown.alpha));
         }
         if agent == 0 {
             for plane in &self.planes {
@@ -306,6 +304,16 @@ impl Scene {
         }
         let at = |p: [f64; 3]| (DVec3::from_array(p) + offset).to_array();
         frame.agents.push(AgentView { root: at(pose.root), com: at(pose.com) });
+    }
+}
+
+impl Shown {
+    /// The geom in the world, moved by `offset`.
+    fn solid(&self, pose: &Pose, offset: DVec3, color: DVec3, alpha: f64) -> Solid {
+        let (pos, rot) = placed(pose, self.geom);
+        let middle = self.mesh.as_ref().map_or(DVec3::ZERO, |mesh| mesh.center);
+        let solid = Solid::new(self.shape, pos + rot * middle + offset, rot, color, alpha);
+        Solid { mesh: self.mesh.clone(), ..solid }
     }
 }
 
@@ -333,7 +341,7 @@ fn placed(pose: &Pose, geom: usize) -> (DVec3, DMat3) {
     (DVec3::from_array(pose.pos), DMat3::from_cols_array_2d(&pose.mat).transpose())
 }
 
-fn shape_of(geom: &Geom) -> Option<Shape> {
+fn shape_of(geom: &Geom, mesh: Option<&Triangles>) -> Option<Shape> {
     let [x, y, _] = geom.size;
     match geom.kind {
         GeomType::Sphere => Some(Shape::Sphere { radius: x }),
@@ -341,8 +349,7 @@ fn shape_of(geom: &Geom) -> Option<Shape> {
         GeomType::Ellipsoid => Some(Shape::Ellipsoid { semi: geom.size }),
         GeomType::Cylinder => Some(Shape::Cylinder { radius: x, half: y }),
         GeomType::Box => Some(Shape::Box { half: geom.size }),
-        // a mesh that nothing touches has no size
-        GeomType::Mesh => geom.hull.map(|_| Shape::Box { half: geom.size }),
+        GeomType::Mesh => mesh.map(|mesh| Shape::Box { half: mesh.half.to_array() }),
         GeomType::Plane | GeomType::Hfield => None,
     }
 }
@@ -376,8 +383,7 @@ fn measure(shown: &[Shown], pose: &Pose) -> (f64, f64, f64) {
     let (mut radius, mut half_width) = (0.0_f64, 0.0_f64);
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for shown in shown.iter().filter(|shown| shown.runner) {
-        let (pos, rot) = placed(pose, shown.geom);
-        let (a, b, r) = Solid::new(shown.shape, pos, rot, DVec3::ZERO, 1.0).soft_rod();
+        let (a, b, r) = shown.solid(pose, DVec3::ZERO, DVec3::ZERO, 1.0).soft_rod();
         for end in [a, b] {
             radius = radius.max((end - com).length() + r);
             half_width = half_width.max((end.y - com.y).abs() + r);

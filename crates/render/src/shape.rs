@@ -1,6 +1,8 @@
 //! The drawable shapes, and closed forms of their intersections with a ray.
 
+use crate::mesh::Triangles;
 use glam::{DMat3, DVec3};
+use std::sync::Arc;
 
 /// A shape in its own frame; sizes in m, named as in MuJoCo.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -243,7 +245,9 @@ fn cylinder(o: DVec3, d: DVec3, radius: f64, half: f64) -> Option<(f64, DVec3)> 
 /// A shape placed in the world, with its color.
 #[derive(Clone, Debug)]
 pub(crate) struct Solid {
+    /// Of a mesh, its box.
     pub shape: Shape,
+    pub mesh: Option<Arc<Triangles>>,
     pub pos: DVec3,
     /// Columns are the shape's axes in the world.
     pub rot: DMat3,
@@ -259,13 +263,17 @@ pub(crate) struct Solid {
 
 impl Solid {
     pub fn new(shape: Shape, pos: DVec3, rot: DMat3, color: DVec3, alpha: f64) -> Self {
-        Self { shape, pos, rot, inverse: rot.transpose(), color, alpha, ghost: false }
+        Self { shape, mesh: None, pos, rot, inverse: rot.transpose(), color, alpha, ghost: false }
     }
 
     /// First entry of a world ray and the world normal there.
     #[inline]
     pub fn enter(&self, o: DVec3, d: DVec3) -> Option<(f64, DVec3)> {
-        let (t, normal) = self.shape.enter(self.inverse * (o - self.pos), self.inverse * d)?;
+        let (o, d) = (self.inverse * (o - self.pos), self.inverse * d);
+        let (t, normal) = match &self.mesh {
+            None => self.shape.enter(o, d)?,
+            Some(mesh) => mesh.enter(o, d)?,
+        };
         Some((t, self.rot * normal))
     }
 

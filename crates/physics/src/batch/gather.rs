@@ -249,6 +249,16 @@ impl<T: Real> Kernel<T> for Read<'_, T> {
                     rows.put(i, r.group.act[i]);
                 }
             }
+            Quantity::MocapPos => {
+                for (k, pos) in r.group.mocap_pos.iter().enumerate() {
+                    rows.put3(3 * k, *pos);
+                }
+            }
+            Quantity::MocapQuat => {
+                for (i, x) in r.group.mocap_quat.iter().flatten().enumerate() {
+                    rows.put(i, *x);
+                }
+            }
             Quantity::Qacc => {
                 for i in 0..r.group.qvel.len() {
                     rows.put(i, r.qacc(i));

@@ -21,6 +21,7 @@ pub(super) trait Lanes: Send {
     fn sensors(&mut self, agent: usize) -> Vec<f64>;
     fn contacts(&mut self, agent: usize) -> Vec<ContactReading>;
     fn set_act(&mut self, agent: usize, act: &[f64]);
+    fn set_mocap(&mut self, agent: usize, mocap: usize, pos: &[f64; 3], quat: &[f64; 4]);
     fn gather(&mut self, wanted: &mut [(Quantity, &mut [f64])]);
     fn ground_height(&mut self, grounds: &[usize], places: &[[f64; 2]], each: usize, heights: &mut [f64]);
     fn save(&self, agent: usize) -> AgentState;
@@ -77,6 +78,11 @@ impl<T: Real> Lanes for LaneBatch<T> {
         for (a, x) in self.groups[g].act.iter_mut().zip(act) {
             a.set(lane, T::scalar(*x));
         }
+    }
+
+    fn set_mocap(&mut self, agent: usize, mocap: usize, pos: &[f64; 3], quat: &[f64; 4]) {
+        let (g, lane) = Self::slot(agent);
+        self.groups[g].set_mocap(lane, mocap, pos, quat);
     }
 
     fn step(&mut self, substeps: usize) {

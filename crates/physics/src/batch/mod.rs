@@ -150,7 +150,8 @@ impl Batch {
         self.quarantined
     }
 
-    /// Sets the state of an agent (MuJoCo's layout). Clears its controls and warm start.
+    /// Sets the state of an agent (MuJoCo's layout). Clears its controls and warm start, and puts its mocap bodies where the model has
+    /// them.
     ///
     /// # Panics
     /// If the agent does not exist or a length is not the model's.
@@ -198,6 +199,16 @@ impl Batch {
         assert!(agent < self.agents, "agent {agent} of {}", self.agents);
         assert_eq!(act.len(), self.model.na, "an activation for each actuator that has one");
         self.inner.set_act(agent, act);
+    }
+
+    /// Moves a mocap body of an agent, until changed or until a reset: its position, m, and its orientation, which is normalized.
+    /// `mocap` is its number in [`Model::mocap_bodies`].
+    ///
+    /// # Panics
+    /// If the agent or the mocap body does not exist.
+    pub fn set_mocap(&mut self, agent: usize, mocap: usize, pos: &[f64; 3], quat: &[f64; 4]) {
+        assert!(agent < self.agents, "agent {agent} of {}", self.agents);
+        self.inner.set_mocap(agent, mocap, pos, quat);
     }
 
     /// An exact copy of all agents' states.

@@ -37,6 +37,10 @@ pub enum Quantity {
     Sensors,
     /// Activations of the actuators that have one, `[na]`.
     Act,
+    /// Positions of the mocap bodies, m, `[mocap][3]`.
+    MocapPos,
+    /// Orientations of the mocap bodies, quaternions, `[mocap][4]`.
+    MocapQuat,
     /// Acceleration at the present state and controls, `[nv]`.
     Qacc,
     /// Forces of contacts, limits, dry friction and equalities on the joints, N or N m, `[nv]`.
@@ -57,6 +61,8 @@ impl Quantity {
             Quantity::Touching | Quantity::Touched | Quantity::NormalForce => model.geoms.len(),
             Quantity::Sensors => model.sensors.iter().map(|s| s.dim).sum(),
             Quantity::Act => model.na,
+            Quantity::MocapPos => 3 * model.mocap_bodies().count(),
+            Quantity::MocapQuat => 4 * model.mocap_bodies().count(),
             Quantity::Qacc | Quantity::QfrcConstraint => model.nv,
             Quantity::ActuatorForce => model.nu,
         }

@@ -58,6 +58,9 @@ pub(crate) fn collide_floor<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut 
                 d *= pyramid_share(mu[0], factor);
                 mu = [mu[0] * factor, mu[1] * factor];
             }
+            if let Some(weights) = group.weights() {
+                d *= weights.contact([c.geom, c.plane].map(|g| sim.model.geoms[g].body));
+            }
         }
         let vel = &vels[c.link];
         let v = cross_add(&ang(vel), &r, &lin(vel));

@@ -75,14 +75,15 @@ fn place_geoms<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
         for (tree, reference) in work.motion.reference.iter().enumerate() {
             places.refer(tree, reference);
         }
-        for (i, link) in sim.contacts.turning.iter().enumerate() {
-            places.turn(i, &work.motion.rot[*link]);
+        for (i, carrier) in sim.contacts.turning.iter().enumerate() {
+            places.turn(i, &work.motion.rot[*carrier]);
         }
     }
     for paired in &sim.contacts.paired {
         let (g, mount) = (paired.geom, &sim.geoms[paired.geom]);
         let (center, axis) = match mount.link {
-            None => (splat3(&mount.pos), splat3(&mount.rot[2])),
+            None if mount.mocap.is_none() => (splat3(&mount.pos), splat3(&mount.rot[2])),
+            None => (work.motion.still(mount), work.motion.axes(mount)[2]),
             Some(l) => (work.motion.arm(mount, l), rotate(&work.motion.rot[l], &splat3(&mount.rot[2]))),
         };
         if kept {

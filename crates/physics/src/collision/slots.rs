@@ -165,6 +165,9 @@ fn rows<T: Real>(
     if let (Some(factor), Cost::Pyramid) = (friction, pair.cost) {
         d *= pyramid_share(T::splat(pair.friction[0]), factor);
     }
+    if let Some(weights) = group.weights() {
+        d *= weights.contact(pair.geoms.map(|g| sim.model.geoms[g].body));
+    }
     let b = T::splat(pair.soft.b);
     let mut u0 = [zero; 6];
     for k in 0..pair.dim {

@@ -46,7 +46,7 @@ impl<T: Real> Ends<T> {
         let (mut acc, mut spin, mut place) = ([z; 2], [z; 2], [z; 2]);
         for i in 0..2 {
             let Some(l) = links[i] else {
-                place[i] = splat3(&points[i].pos);
+                place[i] = work.motion.still(&points[i]);
                 continue;
             };
             r[i] = work.motion.arm(&points[i], l);
@@ -90,11 +90,12 @@ impl<T: Real> Violation<T> {
 
     /// Adds the rows of orientations.
     #[inline(always)]
-    fn orient(&mut self, work: &Work<T>, ends: &Ends<T>, frames: &Frames<T::Scalar>) {
+    fn orient(&mut self, work: &Work<T>, ends: &Ends<T>, points: &[Mount<T::Scalar>; 2], frames: &Frames<T::Scalar>) {
         let (z, one) = (T::zero(), T::lit(1.0));
         let frame = |i: usize| {
             let q = frames.quats[i].map(T::splat);
-            ends.links[i].map_or(q, |l| quat_mul(&rot_to_quat(&work.motion.rot[l]), &q))
+            let carrier = points[i].link.or(work.motion.carrier(&points[i]));
+            carrier.map_or(q, |l| quat_mul(&rot_to_quat(&work.motion.rot[l]), &q))
         };
         let (q0, q1) = (frame(0), frame(1));
         let back = quat_conjugate(&q1);
@@ -141,7 +142,7 @@ fn bodies_block<T: Real>(
     let ends = Ends::new(sim, group, work, points);
     let mut violation = Violation::of_places(&ends);
     if let Some(frames) = frames {
-        violation.orient(work, &ends, frames);
+        violation.orient(work, &ends, points, frames);
     }
     let Violation { error, rate, drift, mut turns } = violation;
     let dim = if frames.is_some() { 6 } else { 3 };
@@ -160,6 +161,9 @@ fn bodies_block<T: Real>(
     block.coupled = links[0].is_some() && links[1].is_some();
     for i in 0..dim {
         block.d[i] = ratio.div(T::splat(spec.diag[i / 3]));
+        if let Some(weights) = group.weights() {
+            block.d[i] *= weights.equalities[spec.index][i / 3];
+        }
         block.u0[i] = rate[i].mul_add(b, k.mul_add(error[i], drift[i]));
     }
     // rows measure the first body against the second; the moving side comes second
@@ -208,6 +212,9 @@ fn lengths_block<T: Real>(
     block.reset(Source::Equality(spec.index), Cost::Equal, 1);
     block.on = T::not(T::none());
     block.d[0] = imp.div((T::lit(1.0) - imp) * T::splat(spec.diag[0]));
+    if let Some(weights) = group.weights() {
+        block.d[0] *= weights.equalities[spec.index][0];
+    }
     block.u0[0] = v.mul_add(T::splat(spec.soft.b), imp * T::splat(spec.soft.k) * error);
     let moments = &forces.tendon_moments[..];
     let follower = terms_of(sim, moments, follower);

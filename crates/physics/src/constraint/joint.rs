@@ -26,7 +26,10 @@ pub(crate) fn joint_rows<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Wor
         }
     }
     for (i, dry) in sim.dry.iter().enumerate() {
-        let (_, d) = impedance(&dry.soft, T::zero());
+        let (_, mut d) = impedance(&dry.soft, T::zero());
+        if let Some(weights) = group.weights() {
+            d *= weights.dofs[dry.dof];
+        }
         let u0 = T::splat(dry.soft.b) * group.qvel[dry.dof];
         let (mut sticking, mut positive) = (T::none(), T::none());
         let recalled = i < work.past.dry.len();
@@ -66,7 +69,10 @@ fn push_limit<T: Real>(
         return;
     }
     let violation = dist - T::splat(soft.margin);
-    let (imp, d) = impedance(soft, violation);
+    let (imp, mut d) = impedance(soft, violation);
+    if let Some(weights) = group.weights() {
+        d *= weights.dofs[dof];
+    }
     let u0 = (sign * group.qvel[dof]).mul_add(T::splat(soft.b), imp * violation * T::splat(soft.k));
     let d = T::masked(on, d);
     let (mut active, mut recalled) = (T::none(), T::none());

@@ -31,8 +31,12 @@ kernel_fn! {
         for (i, t) in sim.tendons.iter().enumerate() {
             let (length, velocity) = (forces.tendon_length[i], forces.tendon_velocity[i]);
             let moments = &forces.tendon_moments[..];
+            let stiffness = group.weights().map(|weights| weights.tendons[i]);
             if let Some((loss, soft)) = &t.friction {
-                let (_, d) = impedance(soft, T::zero());
+                let (_, mut d) = impedance(soft, T::zero());
+                if let Some(stiffness) = stiffness {
+                    d *= stiffness;
+                }
                 let index = rows.blocks.add();
                 let block = &mut rows.blocks[index];
                 block.reset(Source::TendonFriction(i), Cost::Dry, 1);
@@ -49,7 +53,7 @@ kernel_fn! {
             ] {
                 let source = Source::TendonLimit { tendon: i, upper };
                 let terms = t.arms(moments).map(|(dof, arm)| (dof, sign * arm));
-                push(rows, source, soft, dist, sign * velocity, terms);
+                push(rows, source, (soft, stiffness), dist, sign * velocity, terms);
             }
         }
         for limit in &sim.ball_limits {
@@ -64,17 +68,19 @@ kernel_fn! {
                 rate = axis[k].neg_mul_add(group.qvel[limit.dof + k], rate);
             }
             let terms = (0..3).map(|k| (limit.dof + k, -axis[k]));
-            push(rows, Source::BallLimit(limit.dof), &limit.soft, T::splat(limit.range) - angle, rate, terms);
+            let stiffness = group.weights().map(|weights| weights.dofs[limit.dof]);
+            let soft = (&limit.soft, stiffness);
+            push(rows, Source::BallLimit(limit.dof), soft, T::splat(limit.range) - angle, rate, terms);
         }
     }
 }
 
-/// A row that pushes while its distance is below the margin.
+/// A row that pushes while its distance is below the margin. Its stiffness may deviate from the model's by a factor.
 #[inline(always)]
 fn push<T: Real>(
     rows: &mut ConstraintRows<T>,
     source: Source,
-    soft: &Softness<T::Scalar>,
+    (soft, stiffness): (&Softness<T::Scalar>, Option<T>),
     dist: T,
     rate: T,
     terms: impl Iterator<Item = (usize, T)>,
@@ -84,7 +90,10 @@ fn push<T: Real>(
         return;
     }
     let violation = dist - T::splat(soft.margin);
-    let (imp, d) = impedance(soft, violation);
+    let (imp, mut d) = impedance(soft, violation);
+    if let Some(stiffness) = stiffness {
+        d *= stiffness;
+    }
     let index = rows.blocks.add();
     let block = &mut rows.blocks[index];
     block.reset(source, Cost::Push, 1);

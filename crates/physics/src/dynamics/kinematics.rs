@@ -16,13 +16,19 @@ pub(crate) fn kinematics<T: Real>(sim: &Sim<T>, group: &Group<T>, work: &mut Wor
     let n = links.len();
     let Work { motion, dofs, .. } = work;
     // slices of known length need no check per link
-    let (rots, places, inertias) = (&mut motion.rot[..n], &mut motion.pos[..n], &mut motion.inertia[..n]);
+    let ((rots, mocap_rots), (places, mocap_places)) = (motion.rot.split_at_mut(n), motion.pos.split_at_mut(n));
+    let inertias = &mut motion.inertia[..n];
+    mocap_places.copy_from_slice(&group.mocap_pos);
+    for (rot, quat) in mocap_rots.iter_mut().zip(&group.mocap_quat) {
+        *rot = quat_to_rot(quat);
+    }
     for (l, link) in links.iter().enumerate() {
         let joints = &sim.joints[link.joints.clone()];
         let anchors = &mut motion.anchor[link.joints.clone()];
-        let (mut rot, mut pos) = match link.parent {
-            None => ([splat3(&link.rot[0]), splat3(&link.rot[1]), splat3(&link.rot[2])], splat3(&link.pos)),
-            Some(p) => frame_at_parent(link, &rots[p], &places[p]),
+        let (mut rot, mut pos) = match (link.parent, link.mocap) {
+            (Some(p), _) => frame_at_parent(link, &rots[p], &places[p]),
+            (None, None) => ([splat3(&link.rot[0]), splat3(&link.rot[1]), splat3(&link.rot[2])], splat3(&link.pos)),
+            (None, Some(k)) => frame_at_parent(link, &mocap_rots[k], &mocap_places[k]),
         };
         for (joint, anchor) in joints.iter().zip(anchors.iter_mut()) {
             *anchor = apply_joint(joint, group, dofs, &mut rot, &mut pos);

@@ -68,7 +68,7 @@ fn span_drift<T: Real>(motion: &Motion<T>, span: &Span<T::Scalar>, gravity: &V3<
 pub(super) fn arm<T: Real>(motion: &Motion<T>, spot: &Spot<T::Scalar>) -> V3<T> {
     match spot.mount.link {
         Some(link) => motion.arm(&spot.mount, link),
-        None => splat3(&spot.mount.pos),
+        None => motion.still(&spot.mount),
     }
 }
 

@@ -13,7 +13,7 @@ const NONE: u32 = u32::MAX;
 /// Most tests of a point against a face: about a second.
 const MOST_WORK: u64 = 300_000_000;
 /// Most corners.
-const MOST_CORNERS: usize = 1 << 17;
+const MOST_CORNERS: usize = 1 << 16;
 
 struct Face {
     corners: [u32; 3],

@@ -40,6 +40,7 @@ mod muscle;
 mod names;
 mod orientation;
 mod pose;
+pub(crate) mod reweigh;
 mod room;
 mod schema;
 mod sensor;
@@ -98,5 +99,9 @@ impl Model {
 }
 
 fn utf8(bytes: Vec<u8>) -> Result<String, String> {
-    String::from_utf8(bytes).map_err(|e| format!("the file is not UTF-8 text: {e}"))
+    String::from_utf8(bytes).map_err(|e| {
+        let text = &e.as_bytes()[..e.utf8_error().valid_up_to()];
+        let line = 1 + text.iter().filter(|byte| **byte == b'\n').count();
+        format!("the file is not UTF-8 text: line {line} has other bytes")
+    })
 }

@@ -4,6 +4,7 @@ use super::math::*;
 use crate::model::{JointType, Model, Vec3};
 
 /// World poses in the reference configuration.
+#[derive(Debug)]
 pub(crate) struct Pose {
     /// Body frames.
     pub body: Vec<Frame>,

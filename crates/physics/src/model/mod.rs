@@ -88,6 +88,13 @@ pub struct Model {
     pub stat: Statistics,
 }
 
+impl Model {
+    /// Indices of the mocap bodies: bodies that the user may move.
+    pub fn mocap_bodies(&self) -> impl Iterator<Item = usize> + '_ {
+        self.bodies.iter().enumerate().filter(|(_, b)| b.mocap).map(|(i, _)| i)
+    }
+}
+
 /// `<option>` after defaults are applied.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Options {

@@ -162,7 +162,7 @@ impl<T: Real> Readings<'_, T> {
             let at = |i: usize| {
                 let body = &self.sim.bodies[bodies[i]];
                 let pos = rotate_add(&body.rot, &anchors[i].map(T::scalar), &body.pos);
-                Mount { link: body.link, pos, rot: body.rot }
+                Mount { link: body.link, mocap: body.mocap, pos, rot: body.rot }
             };
             let wrench = block.total_wrench(&block.force, &[T::zero(); 3]);
             // the second side of a block moves

@@ -25,6 +25,7 @@ impl<T: Real> Readings<'_, T> {
                 let rot = quat_to_rot(&camera.quat.map(T::scalar));
                 Some(Mount {
                     link: body.link,
+                    mocap: body.mocap,
                     pos: rotate_add(&body.rot, &pos, &body.pos),
                     rot: [rotate(&body.rot, &rot[0]), rotate(&body.rot, &rot[1]), rotate(&body.rot, &rot[2])],
                 })
@@ -38,7 +39,7 @@ impl<T: Real> Readings<'_, T> {
     #[inline(always)]
     pub(super) fn separation(&self, from: &Mount<T::Scalar>, to: &Mount<T::Scalar>) -> V3<T> {
         match to.link {
-            None => self.arm_from(from, None, &splat3(&to.pos)),
+            None => self.arm_from(from, None, &self.work.motion.still(to)),
             Some(l) => self.arm_from(from, Some(self.sim.links[l].tree), &self.work.motion.arm(to, l)),
         }
     }
@@ -47,7 +48,7 @@ impl<T: Real> Readings<'_, T> {
     #[inline(always)]
     pub(super) fn arm_from(&self, from: &Mount<T::Scalar>, tree: Option<usize>, point: &V3<T>) -> V3<T> {
         let (start, start_tree) = match from.link {
-            None => (splat3(&from.pos), None),
+            None => (self.work.motion.still(from), None),
             Some(l) => (self.work.motion.arm(from, l), Some(self.sim.links[l].tree)),
         };
         let arm = sub3(point, &start);
@@ -95,7 +96,10 @@ impl<T: Real> Readings<'_, T> {
         let mut q = literal(&[1.0, 0.0, 0.0, 0.0]);
         for &b in path.iter().rev() {
             let body = &m.bodies[b];
-            q = quat_mul(&q, &literal(&body.quat));
+            q = match self.sim.bodies[b].mocap {
+                Some(k) if body.mocap => self.group.mocap_quat[k],
+                _ => quat_mul(&q, &literal(&body.quat)),
+            };
             for j in body.joint_start..body.joint_start + body.joint_count {
                 let joint = &m.joints[j];
                 match joint.kind {

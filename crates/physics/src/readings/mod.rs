@@ -174,7 +174,7 @@ impl<'a, T: Real> Readings<'a, T> {
     #[inline(always)]
     fn mount_pos(&self, m: &Mount<T::Scalar>) -> V3<T> {
         match m.link {
-            None => splat3(&m.pos),
+            None => self.work.motion.still(m),
             Some(l) => add3(&self.work.motion.arm(m, l), &self.work.motion.reference[self.sim.links[l].tree]),
         }
     }

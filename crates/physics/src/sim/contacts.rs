@@ -34,7 +34,7 @@ pub(crate) struct Contacts<C> {
     pub search: Vec<Option<u32>>,
     /// Number of these.
     pub searches: usize,
-    /// Links of which such a geom is [turning](Paired::turning).
+    /// Links and, after those, mocap bodies of which such a geom is [turning](Paired::turning).
     pub turning: Vec<usize>,
     /// Whether some are [hard](super::weights::is_hard).
     pub hard: bool,
@@ -178,7 +178,8 @@ pub(super) fn contacts<T: Real>(
     out.pairs.sort_by_key(|p| out.specs[p.spec as usize].class());
     let mut meets = vec![false; model.geoms.len()];
     out.pairs.iter().flat_map(|p| p.geoms).for_each(|g| meets[g as usize] = true);
-    list_geoms::<T>(model, &meets, link, &mut out);
+    let carrier = |g: usize| link(g).or(mounts[model.geoms[g].body].mocap.map(|k| tree_of.len() + k));
+    list_geoms::<T>(model, &meets, carrier, &mut out);
     let group = |g: usize| link(g).map(|l| tree_of[l]);
     out.broad = Broad::of(&out.paired, &out.pairs, &out.specs, tree_of.iter().max().map_or(0, |t| t + 1), group);
     out.kept = out.broad.is_none() && (1..=MOST_KEPT).contains(&out.pairs.len());
@@ -187,11 +188,11 @@ pub(super) fn contacts<T: Real>(
     Ok(out)
 }
 
-/// Lists the geoms of pairs, and the links whose turns matter.
+/// Lists the geoms of pairs, and the links and mocap bodies whose turns matter.
 fn list_geoms<T: Real>(
     model: &Model,
     meets: &[bool],
-    link: impl Fn(usize) -> Option<usize>,
+    carrier: impl Fn(usize) -> Option<usize>,
     out: &mut Contacts<T::Scalar>,
 ) {
     let mut whole = vec![false; model.geoms.len()];
@@ -207,7 +208,7 @@ fn list_geoms<T: Real>(
     for g in (0..meets.len()).filter(|g| meets[*g]) {
         let geom = &model.geoms[g];
         let half = if geom.kind == GeomType::Capsule { geom.size[1] } else { 0.0 };
-        let turning = match link(g) {
+        let turning = match carrier(g) {
             Some(l) if whole[g] && !matches!(geom.kind, GeomType::Capsule | GeomType::Sphere) => {
                 let known = out.turning.iter().position(|x| *x == l);
                 let i = known.unwrap_or_else(|| {

@@ -43,7 +43,7 @@ pub(super) fn drives<T: Real>(model: &Model, mounts: &Mounts<T::Scalar>) -> Vec<
     let c = T::scalar;
     let (zero, one) = (c(0.0), c(1.0));
     let axes = [[one, zero, zero], [zero, one, zero], [zero, zero, one]];
-    let still = Spot { mount: Mount { link: None, pos: [zero; 3], rot: axes }, tree: None };
+    let still = Spot { mount: Mount { link: None, mocap: None, pos: [zero; 3], rot: axes }, tree: None };
     let mut count = 0;
     let mut out = Vec::new();
     for (actuator, a) in actuators(model) {

@@ -5,7 +5,6 @@ use super::softness::{Softness, softness};
 use super::tendon::{TendonSpec, Term};
 use super::weights::{inverse_weights, is_hard, tendon_weight};
 use super::weld::BodyMount;
-use crate::algebra::rigid::{self, quat_to_rot};
 use crate::algebra::spatial::{quat_mul, rot_to_quat};
 use crate::lanes::Real;
 use crate::model::{EqualityKind, Model};
@@ -34,7 +33,7 @@ pub(crate) enum Tie<C> {
 /// Additional data of a weld.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Frames<C> {
-    /// Orientations of the frames on their links (in the world for static bodies).
+    /// Orientations of the frames on their links or mocap bodies; in the world for other static bodies.
     pub quats: [[C; 4]; 2],
     /// Weight of the angular error.
     pub scale: C,
@@ -110,11 +109,7 @@ fn tie_bodies<T: Real>(
     frames: Option<(&[[f64; 4]; 2], f64)>,
 ) -> Tie<T::Scalar> {
     let c = T::scalar;
-    let point = |i: usize| {
-        let m = &mounts[bodies[i]];
-        let (pos, _) = rigid::compose(&(m.pos, m.rot), &(anchors[i], quat_to_rot(&[1.0, 0.0, 0.0, 0.0])));
-        Mount { link: link_of[m.body], pos: pos.map(c), rot: m.rot.map(|r| r.map(c)) }
-    };
+    let point = |i: usize| Mount::new::<T>(mounts, link_of, bodies[i], &anchors[i], &[1.0, 0.0, 0.0, 0.0]);
     let frames = frames.map(|(quats, scale)| {
         let on_link = |i: usize| quat_mul(&rot_to_quat(&mounts[bodies[i]].rot), &quats[i]).map(c);
         Frames { quats: [on_link(0), on_link(1)], scale: c(scale) }

@@ -12,6 +12,8 @@ pub(crate) struct Link<C> {
     pub parent: Option<usize>,
     /// Tree that it belongs to.
     pub tree: usize,
+    /// Number of the mocap body that carries the root of a tree.
+    pub mocap: Option<usize>,
     pub pos: [C; 3],
     pub rot: [[C; 3]; 3],
     pub rot_is_identity: bool,
@@ -53,6 +55,8 @@ pub(crate) struct LinkJoint<C> {
 pub(crate) struct Mount<C> {
     /// Link, or `None` for static bodies.
     pub link: Option<usize>,
+    /// Number of the mocap body that carries it.
+    pub mocap: Option<usize>,
     pub pos: [C; 3],
     pub rot: [[C; 3]; 3],
 }
@@ -96,6 +100,7 @@ pub(super) fn links<T: Real>(
         links.push(Link {
             parent,
             tree,
+            mocap: carrier.mocap,
             pos: pos.map(c),
             rot: rot.map(|r| r.map(c)),
             rot_is_identity: rigid::is_identity(&rot),
@@ -158,7 +163,7 @@ impl<C: Copy> Mount<C> {
     ) -> Self {
         let m = &mounts[body];
         let (pos, rot) = rigid::compose(&(m.pos, m.rot), &(*pos, rigid::quat_to_rot(quat)));
-        Mount { link: link_of[m.body], pos: pos.map(T::scalar), rot: rot.map(|r| r.map(T::scalar)) }
+        Mount { link: link_of[m.body], mocap: m.mocap, pos: pos.map(T::scalar), rot: rot.map(|r| r.map(T::scalar)) }
     }
 }
 
@@ -169,7 +174,7 @@ pub(super) fn is_planar<C: Copy + PartialEq + Default>(model: &Model, links: &[L
     let in_plane = |c: &[C; 3]| c[1] == zero;
     let upright =
         |l: &Link<C>| in_plane(&l.rot[0]) && in_plane(&l.rot[2]) && l.rot[1][0] == zero && l.rot[1][2] == zero;
-    links.iter().all(upright)
+    links.iter().all(|l| l.mocap.is_none() && upright(l))
         && model.joints.iter().all(|j| match j.kind {
             JointType::Hinge => j.axis[0] == 0.0 && j.axis[2] == 0.0,
             JointType::Slide => j.axis[1] == 0.0,

@@ -49,18 +49,26 @@ pub(crate) use softness::{Cost, Softness, impedance, impedance_at};
 pub(crate) use string::{Around, Lever, Span, Spot, StringSpec};
 pub(crate) use tendon::TendonSpec;
 pub(crate) use tree_matrix::TreeMatrix;
+pub(crate) use weights::{inverse_weights, tendon_weight, translational_weight, weights_of_body};
+pub(crate) use weld::mounts;
 
 use crate::geometry::convex::{MOST_ITERATIONS, Polyhedron, Search};
 use crate::geometry::height::HeightField;
 use crate::lanes::Real;
+use crate::mjcf::reweigh::Reweigher;
 use crate::model::{Cone, Integrator, Model};
+use std::sync::{Arc, OnceLock};
 
 /// All constants of a simulation in lane precision.
 #[derive(Clone, Debug)]
 pub struct Sim<T: Real> {
     pub(crate) model: Model,
+    /// Finds the inverse weights of agents with masses of their own. Made when the first one appears.
+    pub(crate) reweigher: OnceLock<Arc<Reweigher>>,
     pub(crate) links: Vec<Link<T::Scalar>>,
     pub(crate) trees: usize,
+    /// Number of mocap bodies.
+    pub(crate) mocaps: usize,
     /// Link of every degree of freedom.
     pub(crate) dof_link: Vec<usize>,
     pub(crate) joints: Vec<LinkJoint<T::Scalar>>,
@@ -168,6 +176,7 @@ impl<T: Real> Sim<T> {
         let tolerance = 2.0 * model.opt.tolerance * model.stat.mean_inertia * model.nv.max(1) as f64;
         Ok(Sim {
             trees,
+            mocaps: model.mocap_bodies().count(),
             joints: link::joints::<T>(model),
             armature: model.dofs.iter().map(|d| c(d.armature)).collect(),
             damping: model.dofs.iter().map(|d| c(if flags.damper { d.damping } else { 0.0 })).collect(),
@@ -218,6 +227,7 @@ impl<T: Real> Sim<T> {
             tolerance: c(tolerance),
             dof_link,
             links,
+            reweigher: OnceLock::new(),
             model: model.clone(),
         })
     }

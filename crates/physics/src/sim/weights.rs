@@ -30,6 +30,17 @@ pub(crate) fn inverse_weights(model: &Model, mounts: &[BodyMount], bodies: [usiz
     })
 }
 
+/// The same from the sums of the two bodies' own translational inverse weights and of those estimated.
+#[inline(always)]
+pub(crate) fn translational_weight<T: Real>(own: T, other: T) -> T {
+    T::select(own.lt(other * T::lit(NOTHING)), other * T::lit(LEAST), own)
+}
+
+/// A body's own translational inverse weight, and the one estimated from the other kind of motion.
+pub(crate) fn weights_of_body(model: &Model, mounts: &[BodyMount], body: usize) -> [f64; 2] {
+    [model.bodies[body].invweight0[0], other_weight(model, mounts, [body], 0)]
+}
+
 /// The sum of MuJoCo's inverse weights of tendons, unless it is next to nothing.
 ///
 /// A string that nothing moves in the reference configuration has none, and MuJoCo uses 1e-15. Its constraint is then
@@ -46,7 +57,7 @@ pub(crate) fn tendon_weight<T: Real>(model: &Model, tendons: [Option<usize>; 2])
 }
 
 /// An inverse weight estimated from that of the other kind of motion, as if the bodies were free.
-fn other_weight(model: &Model, mounts: &[BodyMount], bodies: [usize; 2], k: usize) -> f64 {
+fn other_weight<const N: usize>(model: &Model, mounts: &[BodyMount], bodies: [usize; N], k: usize) -> f64 {
     let share = |b: &usize| {
         let (weight, spread) = (model.bodies[*b].invweight0[1 - k], mounts[*b].spread);
         if k == 0 || spread == 0.0 { weight * spread } else { weight / spread }

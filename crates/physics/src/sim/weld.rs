@@ -3,9 +3,11 @@
 use crate::algebra::rigid::{Frame, compose, quat_to_rot, rotate};
 use crate::model::{Model, Vec3};
 
-/// Frame of a body in the frame of the body it is welded to, or in the world if that stands still.
+/// Frame of a body in the frame of the body it is welded to, or in the world if that is part of the world.
 pub(crate) struct BodyMount {
     pub body: usize,
+    /// Number of the mocap body that it is welded to.
+    pub mocap: Option<usize>,
     pub pos: Vec3,
     pub rot: [Vec3; 3],
     /// Mean moment of inertia of all bodies that are welded together, about their center of mass, divided by their
@@ -13,18 +15,19 @@ pub(crate) struct BodyMount {
     pub spread: f64,
 }
 
-/// Pose of every body on its `weld_id`: the identity for moving bodies, world frames for static bodies and for mocap
-/// bodies with everything welded to them.
+/// Pose of every body on its `weld_id`: the identity for moving bodies and mocap bodies, world frames for other static bodies.
 pub(crate) fn mounts(model: &Model) -> Vec<BodyMount> {
     let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mut out: Vec<BodyMount> = Vec::with_capacity(model.bodies.len());
+    let mut mocaps = 0..;
     for (i, body) in model.bodies.iter().enumerate() {
-        let mount = if i == 0 || body.dof_count > 0 {
-            BodyMount { body: i, pos: [0.0; 3], rot: identity, spread: 0.0 }
+        let mount = if i == 0 || body.dof_count > 0 || body.mocap {
+            let mocap = if body.mocap { mocaps.next() } else { None };
+            BodyMount { body: i, mocap, pos: [0.0; 3], rot: identity, spread: 0.0 }
         } else {
             let parent = &out[body.parent];
             let (pos, rot) = compose(&(parent.pos, parent.rot), &(body.pos, quat_to_rot(&body.quat)));
-            BodyMount { body: body.weld_id, pos, rot, spread: 0.0 }
+            BodyMount { body: body.weld_id, mocap: parent.mocap, pos, rot, spread: 0.0 }
         };
         out.push(mount);
     }

@@ -13,7 +13,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 /// survives.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct AgentState {
-    /// Configuration, velocity, controls and activations in MuJoCo's layout, then the solver's warm start.
+    /// Configuration, velocity, controls and activations in MuJoCo's layout, then the solver's warm start, then positions and
+    /// orientations of the mocap bodies.
     #[serde(serialize_with = "to_bits", deserialize_with = "from_bits")]
     numbers: Vec<f64>,
     /// External torque and force on every body; empty for none.
@@ -30,14 +31,14 @@ pub struct AgentState {
 impl AgentState {
     /// Whether its sizes fit this model. Otherwise it cannot be loaded into a `Batch`.
     pub fn fits(&self, model: &Model) -> bool {
-        let Model { nq, nv, nu, na, bodies, .. } = model;
+        let Model { nu, bodies, .. } = model;
         let varied = |v: &Variation| v.mass.len() == bodies.len() && v.strength.len() == *nu;
         let grid = |(i, elevations): (usize, &Option<Vec<f32>>)| match (elevations, model.hfields.get(i)) {
             (Some(elevations), Some(field)) => elevations.len() == field.nrow * field.ncol,
             (Some(_), None) => false,
             (None, _) => true,
         };
-        self.numbers.len() == nq + 2 * nv + nu + na
+        self.numbers.len() == numbers(model)
             && (self.pushes.is_empty() || self.pushes.len() == 6 * bodies.len())
             && self.variation.as_ref().is_none_or(varied)
             && self.grounds.iter().enumerate().all(grid)
@@ -73,12 +74,12 @@ impl AgentState {
     /// Reads the state of an agent of this model from bytes of [`write_to`](AgentState::write_to). Returns it with the
     /// remaining bytes. `None` if the bytes are invalid.
     pub fn read_from<'a>(model: &Model, bytes: &'a [u8]) -> Option<(Self, &'a [u8])> {
-        let Model { nq, nv, nu, na, bodies, hfields, .. } = model;
+        let Model { nu, bodies, hfields, .. } = model;
         let (own, mut bytes) = bytes.split_first()?;
         if own & !(PUSHED | VARIED | GROUNDED | OBSTRUCTED) != 0 {
             return None;
         }
-        let numbers = take(&mut bytes, nq + 2 * nv + nu + na, f64::from_le_bytes)?;
+        let numbers = take(&mut bytes, numbers(model), f64::from_le_bytes)?;
         let pushes = if own & PUSHED == 0 { 0 } else { 6 * bodies.len() };
         let pushes = take(&mut bytes, pushes, f64::from_le_bytes)?;
         let mut variation = None;
@@ -109,6 +110,12 @@ impl AgentState {
         }
         Some((AgentState { numbers, pushes, variation, grounds, obstacles }, bytes))
     }
+}
+
+/// Length of [`AgentState::numbers`].
+fn numbers(model: &Model) -> usize {
+    let Model { nq, nv, nu, na, .. } = model;
+    nq + 2 * nv + nu + na + 7 * model.mocap_bodies().count()
 }
 
 /// Optional parts of a state, one bit each.
@@ -143,6 +150,7 @@ impl<T: Real> Group<T> {
     pub fn save(&self, sim: &Sim<T>, lane: usize) -> AgentState {
         let get = |x: &T| T::widen(x.get(lane));
         let parts = [&self.qpos, &self.qvel, &self.ctrl, &self.act, &self.qacc_warmstart];
+        let (pos, quat) = (self.mocap_pos.iter().flatten(), self.mocap_quat.iter().flatten());
         let mut pushes: Vec<f64> = self.xfrc_applied.iter().flatten().map(get).collect();
         if pushes.iter().all(|x| x.to_bits() == 0) {
             pushes.clear();
@@ -155,7 +163,7 @@ impl<T: Real> Group<T> {
             grounds.extend(lanes.map(|lanes| lanes[lane].as_deref().map(of)));
         }
         AgentState {
-            numbers: parts.into_iter().flatten().map(get).collect(),
+            numbers: parts.into_iter().flatten().chain(pos).chain(quat).map(get).collect(),
             pushes,
             variation: self.varied.as_ref().and_then(|_| self.deviation(sim, lane)),
             grounds,
@@ -178,11 +186,11 @@ impl<T: Real> Group<T> {
     /// If the state belongs to another model.
     pub fn load(&mut self, sim: &Sim<T>, lane: usize, state: &AgentState) {
         let bodies = sim.model.bodies.len();
-        let size = self.qpos.len() + self.qvel.len() + self.ctrl.len() + self.act.len() + self.qacc_warmstart.len();
-        assert_eq!(state.numbers.len(), size, "expected a state of the same model");
+        assert_eq!(state.numbers.len(), numbers(&sim.model), "expected a state of the same model");
         assert!(state.pushes.is_empty() || state.pushes.len() == 6 * bodies, "expected a state of the same model");
         let parts = [&mut self.qpos, &mut self.qvel, &mut self.ctrl, &mut self.act, &mut self.qacc_warmstart];
-        for (x, s) in parts.into_iter().flatten().zip(&state.numbers) {
+        let (pos, quat) = (self.mocap_pos.iter_mut().flatten(), self.mocap_quat.iter_mut().flatten());
+        for (x, s) in parts.into_iter().flatten().chain(pos).chain(quat).zip(&state.numbers) {
             x.set(lane, T::scalar(*s));
         }
         if self.xfrc_applied.is_empty() && !state.pushes.is_empty() {

@@ -27,7 +27,7 @@ pub(crate) struct GeomPlaces<T: Real> {
     pub centers: Vec<V3<T>>,
     /// Their third axes: a plane's normal, a capsule's direction.
     pub directions: Vec<V3<T>>,
-    /// Frames of the links whose turns matter, see `Paired::turning`.
+    /// Axes of the links and mocap bodies whose turns matter, see `Paired::turning`.
     turned: Vec<Rot<T>>,
     /// Reference points of the trees.
     references: Vec<V3<T>>,
@@ -38,7 +38,7 @@ pub(crate) struct GeomPlaces<T: Real> {
     /// Sums of movements: per geom the longest of any of its points, relative to its tree, m; per tree that of the reference point, m.
     ways: Vec<T>,
     shifts: Vec<T>,
-    /// Last movement, per link: of a point at 1 m by its turn, at most, m.
+    /// Last movement, per link or mocap body: of a point at 1 m by its turn, at most, m.
     turns: Vec<T>,
     /// Evaluations since the sums were zero, and the longest of the sums, m.
     evaluations: usize,
@@ -108,7 +108,7 @@ impl<T: Real> GeomPlaces<T> {
         self.references[tree] = *reference;
     }
 
-    /// Records the frame of link number `i` of those whose turns matter.
+    /// Records the axes of number `i` of those whose turns matter.
     #[inline(always)]
     pub fn turn(&mut self, i: usize, rot: &Rot<T>) {
         self.turns[i] = chord(rot, &self.turned[i]);
@@ -127,7 +127,7 @@ impl<T: Real> GeomPlaces<T> {
         self.put(geom, center, axis);
     }
 
-    /// Adds the movement of a geom's points, up to `radius` from its center, by the turn of link number `i`.
+    /// Adds the movement of a geom's points, up to `radius` from its center, by turn number `i`.
     #[inline(always)]
     pub fn follow_turn(&mut self, geom: usize, i: usize, radius: T) {
         self.ways[geom] = radius.mul_add(self.turns[i], self.ways[geom]);

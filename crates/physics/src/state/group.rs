@@ -3,6 +3,7 @@
 use super::clearance::GeomPlaces;
 use super::scratch::Work;
 use super::solids::Solids;
+use super::weights::Weights;
 use crate::algebra::spatial::{V3, V6};
 use crate::geometry::height::HeightField;
 use crate::lanes::Real;
@@ -26,6 +27,10 @@ pub struct Group<T: Real> {
     pub act: Vec<T>,
     /// Acceleration of the last step, the start of the constraint solver.
     pub qacc_warmstart: Vec<T>,
+    /// Positions of the mocap bodies, m, in the order of the bodies.
+    pub mocap_pos: Vec<V3<T>>,
+    /// Orientations of the mocap bodies, unit quaternions.
+    pub mocap_quat: Vec<[T; 4]>,
     /// External torque and force on every body, world axes, at its center of mass; empty for none. Kept until changed.
     pub xfrc_applied: Vec<V6<T>>,
     /// Constants that differ from the model's.
@@ -47,6 +52,8 @@ pub(crate) struct Varied<T: Real> {
     /// Per actuator.
     pub strength: Vec<T>,
     pub gravity: V3<T>,
+    /// Inverse weights, if masses have deviated.
+    pub weights: Option<Box<Weights<T>>>,
 }
 
 impl<T: Real> Group<T> {
@@ -54,11 +61,14 @@ impl<T: Real> Group<T> {
     pub fn new(sim: &Sim<T>) -> Self {
         let m = &sim.model;
         let zero = T::zero();
+        let mocaps = || m.mocap_bodies().map(|b| &m.bodies[b]);
         Group {
             qpos: m.qpos0.iter().map(|x| T::lit(*x)).collect(),
             qvel: vec![zero; m.nv],
             ctrl: vec![zero; m.nu],
             act: vec![zero; m.na],
+            mocap_pos: mocaps().map(|b| b.pos.map(T::lit)).collect(),
+            mocap_quat: mocaps().map(|b| b.quat.map(T::lit)).collect(),
             xfrc_applied: Vec::new(),
             varied: None,
             grounds: Vec::new(),
@@ -97,8 +107,21 @@ impl<T: Real> Group<T> {
         }
     }
 
-    /// Sets the state of one agent. Clears its controls, activations, pushes and warm start. Quaternions are
-    /// normalized.
+    /// Moves a mocap body of one agent, until changed or until a reset. The quaternion is normalized.
+    ///
+    /// # Panics
+    /// If there is no mocap body with this number.
+    pub fn set_mocap(&mut self, lane: usize, mocap: usize, pos: &[f64; 3], quat: &[f64; 4]) {
+        for (x, s) in self.mocap_pos[mocap].iter_mut().zip(pos) {
+            x.set(lane, T::scalar(*s));
+        }
+        for (x, s) in self.mocap_quat[mocap].iter_mut().zip(unit(quat)) {
+            x.set(lane, T::scalar(s));
+        }
+    }
+
+    /// Sets the state of one agent. Clears its controls, activations, pushes and warm start, and puts its mocap bodies where the model
+    /// has them. Quaternions are normalized.
     ///
     /// # Panics
     /// If a slice's length is not the model's `nq` or `nv`.
@@ -114,12 +137,14 @@ impl<T: Real> Group<T> {
                 JointType::Ball => joint.qpos_adr,
                 _ => continue,
             };
-            let q = &qpos[start..start + 4];
-            let n = q.iter().map(|x| x * x).sum::<f64>().sqrt();
-            for i in 0..4 {
-                let x = if n > 1e-10 { q[i] / n } else { f64::from(i == 0) };
-                self.qpos[start + i].set(lane, T::scalar(x));
+            let q = [qpos[start], qpos[start + 1], qpos[start + 2], qpos[start + 3]];
+            for (v, x) in self.qpos[start..].iter_mut().zip(unit(&q)) {
+                v.set(lane, T::scalar(x));
             }
+        }
+        for (k, body) in sim.model.mocap_bodies().enumerate() {
+            let body = &sim.model.bodies[body];
+            self.set_mocap(lane, k, &body.pos, &body.quat);
         }
         for (v, x) in self.qvel.iter_mut().zip(qvel) {
             v.set(lane, T::scalar(*x));
@@ -149,4 +174,10 @@ impl<T: Real> Group<T> {
         }
         sound
     }
+}
+
+/// A normalized quaternion; the identity for zero.
+fn unit(q: &[f64; 4]) -> [f64; 4] {
+    let n = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if n > 1e-10 { q.map(|x| x / n) } else { [1.0, 0.0, 0.0, 0.0] }
 }

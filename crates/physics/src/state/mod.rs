@@ -11,6 +11,7 @@ mod solids;
 mod stats;
 mod sweep;
 mod variation;
+mod weights;
 
 pub use agent::AgentState;
 pub(crate) use clearance::{RelativePose, clearance};

@@ -1,7 +1,7 @@
 //! The own constants of an agent: masses, friction, strength, gravity, ground.
 //!
-//! All agents share a model's constants. For domain randomization each may deviate from them. As in MuJoCo when
-//! `mjModel` is edited in place, the regularization of constraints (`invweight0`) stays that of the model.
+//! All agents share a model's constants. For domain randomization each may deviate from them. Masses change the softness of constraints,
+//! too, as in MuJoCo when `mj_setConst` follows an edit of `mjModel`.
 
 use super::group::{Group, Varied};
 use crate::algebra::spatial::V3;
@@ -15,8 +15,8 @@ use std::sync::Arc;
 /// One agent's deviations from the model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Variation {
-    /// Factor of every body's mass and inertia, one per body. Bodies without joints use the factor of the body that
-    /// they are welded to.
+    /// Factor of every body's mass and inertia, one per body. Bodies without joints use the factor of the body that they
+    /// are welded to, and keep their masses if no joint moves that one.
     pub mass: Vec<f64>,
     /// Factor of all friction coefficients of contacts.
     pub friction: f64,
@@ -65,6 +65,7 @@ impl<T: Real> Group<T> {
                 friction: one,
                 strength: vec![one; model.nu],
                 gravity: sim.gravity.map(T::splat),
+                weights: None,
             })
         });
         for (body, b) in model.bodies.iter().enumerate() {
@@ -81,6 +82,7 @@ impl<T: Real> Group<T> {
         for (g, x) in varied.gravity.iter_mut().zip(variation.gravity) {
             g.set(lane, T::scalar(x));
         }
+        self.reweigh(sim, lane, &variation.mass);
     }
 
     /// The constants of an agent.

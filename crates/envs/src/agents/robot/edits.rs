@@ -1,4 +1,4 @@
-//! The changes that make a model ready to learn: names for all geoms and actuators, ground, a time step, and hard feet.
+//! The changes that make a model ready to learn: ground, a time step, and hard feet.
 
 use marathon_physics::mjcf::MjcfError;
 use marathon_physics::model::{Integrator, Model};
@@ -18,17 +18,6 @@ const HARD: [f64; 5] = [0.9, 0.95, 0.001, 0.5, 2.0];
 const LEAST_IMPEDANCE: f64 = 0.8;
 /// Least sliding friction of a foot.
 const LEAST_FRICTION: f64 = 0.6;
-
-/// Names the elements of a kind that have no name, so that edits can refer to them.
-pub fn name_all(spec: &mut ModelSpec, kind: Kind, noun: &str) -> Result<(), MjcfError> {
-    let mut number = 0;
-    while let Some(mut unnamed) = spec.find_mut(kind, |element| element.name().is_none()) {
-        // a name that no model has by chance
-        unnamed.set("name", format!("{noun} {number}"))?;
-        number += 1;
-    }
-    Ok(())
-}
 
 /// Sets a time step and solver that suit servos and decisions, and adds ground to a model that has none.
 pub fn prepare(spec: &mut ModelSpec, given: &Model) -> Result<(), MjcfError> {

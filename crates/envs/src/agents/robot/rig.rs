@@ -105,8 +105,9 @@ impl Rig {
             None => ModelSpec::from_xml_str(QUADRUPED, "quadruped.xml"),
         };
         let mut spec = read.map_err(mjcf)?;
-        edits::name_all(&mut spec, Kind::Geom, "geom").map_err(mjcf)?;
-        edits::name_all(&mut spec, Kind::Actuator, "actuator").map_err(mjcf)?;
+        // edits refer to these by name
+        spec.name_all(Kind::Geom, "geom");
+        spec.name_all(Kind::Actuator, "actuator");
         let given = spec.compile().map_err(mjcf)?;
         let root = stance::root(&given).map_err(wrong)?;
         let (qpos, mut pose, chosen) = stance::pose(&given, &arguments.pose).map_err(wrong)?;

@@ -67,6 +67,7 @@ use keyframes::Share;
 use kind::WORLD;
 use library::{Library, keys};
 use references::Gone;
+use std::collections::BTreeSet;
 use std::path::{Path as FilePath, PathBuf};
 use walk::Path;
 
@@ -196,6 +197,20 @@ impl ModelSpec {
             (of == kind && test(ElementRef(element))).then(|| path.to_vec())
         })?;
         Some(ElementMut { spec: self, path, kind: Some(kind) })
+    }
+
+    /// Gives every element of a kind without a name one that no other has: `noun` and a number.
+    pub fn name_all(&mut self, kind: Kind, noun: &str) {
+        let taken: BTreeSet<String> = walk::names(&self.root, kind).into_iter().map(str::to_owned).collect();
+        let mut unnamed = Vec::new();
+        walk::search(&self.root, |of, element, path| {
+            unnamed.extend((of == kind && kind.name(element).is_none()).then(|| path.to_vec()));
+            None::<()>
+        });
+        let free = (0..).map(|number| format!("{noun} {number}")).filter(|name| !taken.contains(name));
+        for (path, name) in unnamed.iter().zip(free) {
+            part::set(walk::at_mut(&mut self.root, path), "name", name.into());
+        }
     }
 
     /// A section without names, such as `option` or `compiler`, to change it. The model gets one if it has none.

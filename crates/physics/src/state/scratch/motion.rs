@@ -9,7 +9,7 @@ use crate::sim::{Mount, Sim};
 pub(crate) struct Motion<T: Real> {
     /// Position of each tree's reference point (the origin of its root link) in the world.
     pub reference: Vec<V3<T>>,
-    /// Link frames: rotation, and position relative to the tree's reference point.
+    /// Link frames: rotation, and position relative to the tree's reference point. Then those of the mocap bodies in the world.
     pub rot: Vec<Rot<T>>,
     pub pos: Vec<V3<T>>,
     /// Anchor of every joint, relative to the reference point (absolute while a root link is being computed).
@@ -29,8 +29,8 @@ impl<T: Real> Motion<T> {
         let (nl, nj) = (sim.links.len(), sim.joints.len());
         Motion {
             reference: vec![[z; 3]; sim.trees],
-            rot: vec![[[z; 3]; 3]; nl],
-            pos: vec![[z; 3]; nl],
+            rot: vec![[[z; 3]; 3]; nl + sim.mocaps],
+            pos: vec![[z; 3]; nl + sim.mocaps],
             anchor: vec![[z; 3]; nj],
             inertia: vec![[z; 10]; nl],
             vel: vec![[z; 6]; nl],
@@ -48,9 +48,24 @@ impl<T: Real> Motion<T> {
     /// Axes of a frame in the world.
     #[inline(always)]
     pub fn axes(&self, m: &Mount<T::Scalar>) -> Rot<T> {
-        match m.link {
+        match m.link.or(self.carrier(m)) {
             None => [splat3(&m.rot[0]), splat3(&m.rot[1]), splat3(&m.rot[2])],
             Some(l) => compose(&self.rot[l], &m.rot),
         }
+    }
+
+    /// Position of a frame that no joint moves, in the world.
+    #[inline(always)]
+    pub fn still(&self, m: &Mount<T::Scalar>) -> V3<T> {
+        match self.carrier(m) {
+            None => splat3(&m.pos),
+            Some(mocap) => self.arm(m, mocap),
+        }
+    }
+
+    /// Index of the mocap body that carries a frame, among the frames of links and mocap bodies.
+    #[inline(always)]
+    pub fn carrier(&self, m: &Mount<T::Scalar>) -> Option<usize> {
+        m.mocap.map(|k| self.vel.len() + k)
     }
 }
