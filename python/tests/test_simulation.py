@@ -102,7 +102,7 @@ HAND = """
   <option timestep="0.002" iterations="80" tolerance="1e-12"/>
   <worldbody>
     <geom name="floor" type="plane" size="5 5 1"/>
-    <body name="hand" mocap="true" pos="0 0 0.5"><geom type="box" size="0.05 0.05 0.02" contype="0" conaffinity="0"/></body>
+    <body name="hand" mocap="true" pos="0 0 0.5"><geom size="0.05" contype="0" conaffinity="0"/></body>
     <body name="paddle" mocap="true" pos="0.5 0 0.1"><geom name="paddle" type="box" size="0.02 0.2 0.1"/></body>
     <body name="held" pos="0 0 0.4"><freejoint/><geom name="held" size="0.05"/></body>
     <body name="puck" pos="0.4 0 0.05"><freejoint/><geom type="box" size="0.05 0.05 0.05"/></body>

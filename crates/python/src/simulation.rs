@@ -196,7 +196,7 @@ impl Simulation {
     }
 
     /// Moves a mocap body, given by its index or name, of all agents or those of a mask: its position, m, `(num_envs, 3)`, and its
-    /// orientation, `(num_envs, 4)`. What is omitted stays. It lasts until changed or until a reset.
+    /// orientation, `(num_envs, 4)`. Omitted parts stay as they are. They last until changed or until a reset.
     #[pyo3(signature = (pos = None, quat = None, *, body, mask = None))]
     fn set_mocap(
         slf: &Bound<'_, Self>,

@@ -14,6 +14,8 @@ pub(crate) const SUN_COLOR: [f64; 3] = [1.00, 0.93, 0.82];
 const SUN_POWER: f64 = 0.98;
 /// Light rays toward the sun's disk for shapes without a closed form.
 const SUN_RAYS: usize = 16;
+/// The last of these, which are at the edge of the disk.
+const EDGE_RAYS: usize = 5;
 
 /// The lights of a picture.
 pub(crate) struct Light {
@@ -76,7 +78,21 @@ impl Light {
         if along < -reach || (to - along * self.sun).length_squared() > reach * reach {
             return 1.0;
         }
-        let blocked = self.disk.iter().filter(|&&d| solid.enter(p, d).is_some()).count();
+        let stopped = |rays: &[DVec3]| rays.iter().filter(|d| solid.stops(p, **d)).count();
+        let (inner, edge) = self.disk.split_at(SUN_RAYS - EDGE_RAYS);
+        if solid.mesh.is_some() {
+            let (a, b, radius) = solid.hull_rod();
+            if rod_visibility(p, self.sun, a, b, radius) >= 1.0 {
+                return 1.0;
+            }
+        }
+        let mut blocked = stopped(edge);
+        // where the edge of the disk sees all or nothing of a mesh, so does the rest
+        if solid.mesh.is_none() || (1..EDGE_RAYS).contains(&blocked) {
+            blocked += stopped(inner);
+        } else if blocked == EDGE_RAYS {
+            return 0.0;
+        }
         1.0 - blocked as f64 / SUN_RAYS as f64
     }
 }

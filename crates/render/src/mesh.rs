@@ -65,6 +65,20 @@ impl Triangles {
 
     /// First meeting of the ray `o + t d`, `t > 0`, with the surface from either side, and the normal on the side of the ray.
     pub fn enter(&self, o: DVec3, d: DVec3) -> Option<(f64, DVec3)> {
+        let (t, face, [u, v]) = self.meet(o, d, false)?;
+        let [first, second, third] = face.normals;
+        let normal = (first * (1.0 - u - v) + second * u + third * v).as_dvec3().normalize_or(-d);
+        let flat = face.edges[0].cross(face.edges[1]).as_dvec3();
+        Some((t, if flat.dot(d) > 0.0 { -normal } else { normal }))
+    }
+
+    /// Whether such a ray meets the surface.
+    pub fn stops(&self, o: DVec3, d: DVec3) -> bool {
+        self.meet(o, d, true).is_some()
+    }
+
+    /// The first face that a ray meets, or `any`, with the weights of its second and third corner.
+    fn meet(&self, o: DVec3, d: DVec3, any: bool) -> Option<(f64, &Face, [f32; 2])> {
         // from near the box, so that single precision suffices
         let start = (o.length() - self.half.length()).max(0.0);
         let (o, d) = ((o + start * d).as_vec3(), d.as_vec3());
@@ -84,27 +98,37 @@ impl Triangles {
                         nearest = (t, Some((face, weights)));
                     }
                 }
+                if any && nearest.1.is_some() {
+                    break;
+                }
                 continue;
             }
-            let ways = [first, first + 1].map(|child| self.nodes[child].reached(o, inverse, nearest.0));
-            // the nearer child is looked at first
-            let far_first = if ways[0] < ways[1] { [1, 0] } else { [0, 1] };
-            for child in far_first.into_iter().filter(|child| ways[*child].is_some()) {
-                stack[count] = (first + child) as u32;
+            let one = self.nodes[first].reached(o, inverse, nearest.0);
+            let other = self.nodes[first + 1].reached(o, inverse, nearest.0);
+            let mut open = |child: usize| {
+                stack[count] = child as u32;
                 count += 1;
+            };
+            match (one, other) {
+                // the nearer one is looked at first
+                (Some(a), Some(b)) => {
+                    let swapped = usize::from(b < a);
+                    open(first + 1 - swapped);
+                    open(first + swapped);
+                }
+                (Some(_), None) => open(first),
+                (None, Some(_)) => open(first + 1),
+                (None, None) => {}
             }
         }
-        let (face, [u, v]) = nearest.1?;
-        let flat = face.edges[0].cross(face.edges[1]);
-        let normal = face.normals[0] * (1.0 - u - v) + face.normals[1] * u + face.normals[2] * v;
-        let normal = if flat.dot(d) > 0.0 { -normal } else { normal };
-        Some((start + f64::from(nearest.0), normal.as_dvec3().normalize_or(-d.as_dvec3())))
+        let (face, weights) = nearest.1?;
+        Some((start + f64::from(nearest.0), face, weights))
     }
 }
 
 impl Node {
     /// Distance at which a ray is in the box, if that is below `most`.
-    #[inline]
+    #[inline(always)]
     fn reached(&self, o: Vec3, inverse: Vec3, most: f32) -> Option<f32> {
         let (a, b) = ((self.low - o) * inverse, (self.high - o) * inverse);
         // a ray along a side gives NaN, which these leave out
@@ -116,7 +140,7 @@ impl Node {
 
 impl Face {
     /// Distance and weights of the second and third corner (Moller and Trumbore, 1997).
-    #[inline]
+    #[inline(always)]
     fn meet(&self, o: Vec3, d: Vec3) -> Option<(f32, [f32; 2])> {
         let [a, b] = self.edges;
         let across = d.cross(b);
@@ -212,6 +236,8 @@ mod tests {
             }
         }
         assert_eq!(met, 400);
+        assert!(triangles.stops(DVec3::new(-3.0, 0.1, 0.0), DVec3::X));
+        assert!(!triangles.stops(DVec3::new(-3.0, 0.6, 0.0), DVec3::X));
         assert!(triangles.enter(DVec3::new(-3.0, 0.6, 0.0), DVec3::X).is_none());
         assert!(triangles.enter(DVec3::new(3.0, 0.0, 0.0), DVec3::X).is_none());
     }

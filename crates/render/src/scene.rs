@@ -92,7 +92,8 @@ impl Scene {
     /// Collects the visible geoms of `model`.
     ///
     /// It leaves out geoms with alpha 0, and MuJoCo's hidden groups 3 and up. A moving body that has only hidden geoms shows
-    /// them, and all do where every geom of the moving bodies is hidden. Meshes whose files were not found cannot be shown.
+    /// them, and all do where every geom of the moving bodies is hidden. Where a moving body has meshes that nothing touches, its
+    /// colliding geoms without a color are left out. Meshes whose files were not found cannot be shown.
     pub fn new(model: &Model) -> Self {
         let moving = |geom: &Geom| model.bodies.get(geom.body).is_some_and(|body| body.weld_id != 0);
         let opaque = |geom: &Geom| geom.rgba[3] > 0.0;
@@ -104,8 +105,16 @@ impl Scene {
         let known = |geom: &Geom| geom.kind != GeomType::Mesh || mesh_of(geom).is_some();
         let drawn = |geom: &&Geom| opaque(geom) && listed(geom) && known(geom);
         let shows: BTreeSet<usize> = model.geoms.iter().filter(drawn).map(|geom| geom.body).collect();
-        let visible =
-            |geom: &Geom| opaque(geom) && (listed(geom) || moving(geom) && (all_hidden || !shows.contains(&geom.body)));
+        // bodies that have meshes for the eye only, whose other shapes are there to touch
+        let collides = |geom: &Geom| geom.contype != 0 || geom.conaffinity != 0;
+        let dress = |geom: &&Geom| geom.kind == GeomType::Mesh && !collides(geom) && drawn(geom);
+        let dressed: BTreeSet<usize> = model.geoms.iter().filter(dress).map(|geom| geom.body).collect();
+        let plain = |geom: &Geom| collides(geom) && geom.rgba == UNCHOSEN;
+        let visible = |geom: &Geom| {
+            opaque(geom)
+                && (listed(geom) || moving(geom) && (all_hidden || !shows.contains(&geom.body)))
+                && !(moving(geom) && dressed.contains(&geom.body) && plain(geom))
+        };
 
         let tree = model.joints.first().and_then(|joint| model.bodies.get(joint.body)).map(|body| body.root_id);
         let rest = kinematics::pose(model, &model.qpos0, 0).ok();
@@ -117,6 +126,8 @@ impl Scene {
                 planes.push(ShownPlane { geom: index, half: [geom.size[0], geom.size[1]] });
             } else if geom.kind == GeomType::Hfield {
                 fields.push(index);
+            } else if twin(model, index, &visible) {
+                // what is seen and what is touched is often the same mesh twice
             } else if let Some(shape) = shape_of(geom, mesh_of(geom).as_deref()) {
                 let mesh = mesh_of(geom);
                 let color = (geom.rgba != UNCHOSEN).then(|| {
@@ -339,6 +350,14 @@ impl Frame {
 fn placed(pose: &Pose, geom: usize) -> (DVec3, DMat3) {
     let pose = &pose.geoms[geom];
     (DVec3::from_array(pose.pos), DMat3::from_cols_array_2d(&pose.mat).transpose())
+}
+
+/// Whether an earlier visible geom is the same mesh in the same place.
+fn twin(model: &Model, index: usize, visible: &impl Fn(&Geom) -> bool) -> bool {
+    let geom = &model.geoms[index];
+    let own = model.bodies[geom.body].geom_start..index;
+    let same = |other: &Geom| other.mesh == geom.mesh && other.pos == geom.pos && other.quat == geom.quat;
+    geom.mesh.is_some() && model.geoms[own].iter().any(|other| same(other) && visible(other))
 }
 
 fn shape_of(geom: &Geom, mesh: Option<&Triangles>) -> Option<Shape> {

@@ -277,6 +277,16 @@ impl Solid {
         Some((t, self.rot * normal))
     }
 
+    /// Whether a world ray enters it.
+    #[inline]
+    pub fn stops(&self, o: DVec3, d: DVec3) -> bool {
+        let (o, d) = (self.inverse * (o - self.pos), self.inverse * d);
+        match &self.mesh {
+            None => self.shape.enter(o, d).is_some(),
+            Some(mesh) => mesh.stops(o, d),
+        }
+    }
+
     /// Ends and radius of a rod around the solid.
     pub fn hull_rod(&self) -> (DVec3, DVec3, f64) {
         self.place(self.shape.hull_rod())

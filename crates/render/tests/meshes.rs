@@ -23,6 +23,8 @@ fn bodies_of_meshes_are_shown() {
     assert!((visual - mesh).abs() < 1e-9, "a mesh for the eye only, and a hidden shape: {visual}");
     let hidden = height("<geom type='mesh' mesh='it' rgba='0 0 0 0'/><geom size='0.1' group='3'/>");
     assert!((hidden - 0.2).abs() < 1e-9, "a hidden shape, as there is nothing else: {hidden}");
+    let dressed = height("<geom type='mesh' mesh='it' contype='0' conaffinity='0'/><geom size='0.4'/>");
+    assert!((dressed - mesh).abs() < 1e-9, "what is there to touch is under the mesh: {dressed}");
     let both = height("<geom type='mesh' mesh='it'/><geom size='0.4'/>");
     assert!((both - 0.8).abs() < 1e-9, "both: {both}");
 }

@@ -106,8 +106,8 @@ pub(crate) struct Paired<C> {
     pub geom: usize,
     /// Half length of a capsule along the third axis. Other geoms have 0, and a ball bounds them.
     pub half: C,
-    /// Of a geom whose whole shape counts in a pair, and which is not round: the number of what carries it among those whose turns
-    /// matter, and its radius.
+    /// Set if the whole shape counts in a pair and is not round: the number of its carrier among those whose turns matter, and its
+    /// radius.
     pub turning: Option<(usize, C)>,
 }
 

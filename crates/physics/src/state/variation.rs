@@ -4,9 +4,11 @@
 //! too, as in MuJoCo when `mj_setConst` follows an edit of `mjModel`.
 
 use super::group::{Group, Varied};
+use super::weights::Weights;
 use crate::algebra::spatial::V3;
 use crate::geometry::height::HeightField;
 use crate::lanes::{MAX_LANES, Real};
+use crate::mjcf::reweigh::Reweigher;
 use crate::model::{Model, Vec3};
 use crate::sim::Sim;
 use serde::{Deserialize, Serialize};
@@ -83,6 +85,29 @@ impl<T: Real> Group<T> {
             g.set(lane, T::scalar(x));
         }
         self.reweigh(sim, lane, &variation.mass);
+    }
+
+    /// Finds an agent's inverse weights from the factors of its bodies' masses. They stay those of the model where its mass matrix has
+    /// no inverse.
+    fn reweigh(&mut self, sim: &Sim<T>, lane: usize, masses: &[f64]) {
+        let model = &sim.model;
+        // rounded like the masses, so that a state that was saved has the same
+        let factors: Vec<f64> = model.bodies.iter().map(|b| T::widen(T::scalar(masses[b.weld_id]))).collect();
+        let deviates = model.bodies.iter().zip(&factors).any(|(b, factor)| b.weld_id > 0 && *factor != 1.0);
+        let Some(varied) = &mut self.varied else { return };
+        if !deviates && varied.weights.is_none() {
+            return;
+        }
+        let reweigher = || sim.reweigher.get_or_init(|| Arc::new(Reweigher::new(model)));
+        let own = if deviates { reweigher().with_masses(&factors) } else { None };
+        let weights = varied.weights.get_or_insert_with(|| Box::new(Weights::new(sim)));
+        weights.set(lane, model, own.as_ref().unwrap_or(model));
+    }
+
+    /// The inverse weights of agents whose masses deviate.
+    #[inline(always)]
+    pub(crate) fn weights(&self) -> Option<&Weights<T>> {
+        self.varied.as_ref()?.weights.as_deref()
     }
 
     /// The constants of an agent.

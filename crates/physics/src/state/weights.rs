@@ -1,11 +1,8 @@
 //! Inverse weights of agents whose masses deviate: how much stiffer or softer their constraints are.
 
-use super::group::Group;
 use crate::lanes::Real;
-use crate::mjcf::reweigh::Reweigher;
 use crate::model::{EqualityKind, Model};
 use crate::sim::{Sim, inverse_weights, mounts, tendon_weight, translational_weight, weights_of_body};
-use std::sync::Arc;
 
 /// Stiffness of constraints relative to the model's: the inverse of the ratio of inverse weights.
 #[derive(Clone, Debug)]
@@ -22,7 +19,7 @@ pub(crate) struct Weights<T: Real> {
 
 impl<T: Real> Weights<T> {
     /// Those of the model.
-    fn new(sim: &Sim<T>) -> Self {
+    pub fn new(sim: &Sim<T>) -> Self {
         let (model, one) = (&sim.model, T::lit(1.0));
         let mounts = mounts(model);
         let body = |b: usize| [weights_of_body(model, &mounts, b).map(T::lit); 2];
@@ -43,7 +40,7 @@ impl<T: Real> Weights<T> {
     }
 
     /// Sets the weights of one lane to those of `own`, a model with the same bodies.
-    fn set(&mut self, lane: usize, model: &Model, own: &Model) {
+    pub fn set(&mut self, lane: usize, model: &Model, own: &Model) {
         let mounts = mounts(model);
         for (body, x) in self.bodies.iter_mut().enumerate() {
             let weights = weights_of_body(own, &mounts, body);
@@ -73,30 +70,5 @@ impl<T: Real> Weights<T> {
             };
             x.iter_mut().zip(ratios).for_each(|(x, r)| x.set(lane, r));
         }
-    }
-}
-
-impl<T: Real> Group<T> {
-    /// Finds an agent's inverse weights from the factors of its bodies' masses. They stay those of the model where its mass matrix has
-    /// no inverse.
-    pub(super) fn reweigh(&mut self, sim: &Sim<T>, lane: usize, masses: &[f64]) {
-        let model = &sim.model;
-        // rounded like the masses, so that a state that was saved has the same
-        let factors: Vec<f64> = model.bodies.iter().map(|b| T::widen(T::scalar(masses[b.weld_id]))).collect();
-        let deviates = model.bodies.iter().zip(&factors).any(|(b, factor)| b.weld_id > 0 && *factor != 1.0);
-        let Some(varied) = &mut self.varied else { return };
-        if !deviates && varied.weights.is_none() {
-            return;
-        }
-        let reweigher = || sim.reweigher.get_or_init(|| Arc::new(Reweigher::new(model)));
-        let own = if deviates { reweigher().with_masses(&factors) } else { None };
-        let weights = varied.weights.get_or_insert_with(|| Box::new(Weights::new(sim)));
-        weights.set(lane, model, own.as_ref().unwrap_or(model));
-    }
-
-    /// The inverse weights of agents whose masses deviate.
-    #[inline(always)]
-    pub(crate) fn weights(&self) -> Option<&Weights<T>> {
-        self.varied.as_ref()?.weights.as_deref()
     }
 }
