@@ -148,7 +148,7 @@ def test_wrong_mocap_targets_say_what_is_right() -> None:
         sim.set_mocap(here, body="held")
     with pytest.raises(ValueError, match="pos has the shape"):
         sim.set_mocap(np.zeros((3, 3)), body="hand")
-    with pytest.raises(ValueError, match="agent 1: pos is nan, expected finite numbers"):
+    with pytest.raises(ValueError, match="agent 1: pos is NaN, expected finite numbers"):
         sim.set_mocap([[0, 0, 0], [0, np.nan, 0]], body="hand")
     with pytest.raises(ValueError, match="agent 0: quat is zero, expected a rotation, w x y z"):
         sim.set_mocap(quat=np.zeros((2, 4)), body="hand")
