@@ -808,10 +808,11 @@ class Simulation:
         """Set constants of all agents or those of a mask, for domain randomization.
 
         They last over resets, until changed, and belong to snapshots. Omitted constants have the model's values. Masses
-        change the softness of limits and contacts, too, as MuJoCo's ``mj_setConst`` does.
+        change the softness of limits and contacts, too, as MuJoCo's ``mj_setConst`` does; muscles keep their forces.
 
         Args:
-            mass: factors of the bodies' masses and inertias, ``(num_envs, nbody)``.
+            mass: factors of the bodies' masses and inertias, ``(num_envs, nbody)``. A body without joints has the factor of
+                the body that carries it, ``model.body_weld``.
             friction: factors of all friction coefficients of contacts, ``(num_envs,)``.
             strength: factors of the actuators' forces, ``(num_envs, nu)``.
             gravity: gravity, m/s^2, ``(num_envs, 3)``.

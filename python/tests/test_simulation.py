@@ -150,12 +150,27 @@ def test_wrong_mocap_targets_say_what_is_right() -> None:
         sim.set_mocap(np.zeros((3, 3)), body="hand")
     with pytest.raises(ValueError, match="agent 1: pos is NaN, expected finite numbers"):
         sim.set_mocap([[0, 0, 0], [0, np.nan, 0]], body="hand")
+    with pytest.raises(ValueError, match="agent 0: pos is 1000"):
+        sim.set_mocap([[1e39, 0, 0], [0, 0, 0]], body="hand")
     with pytest.raises(ValueError, match="agent 0: quat is zero, expected a rotation, w x y z"):
         sim.set_mocap(quat=np.zeros((2, 4)), body="hand")
     assert sim.mocap_pos[0, 0].tolist() == [0.0, 0.0, 0.5]  # nothing changed
     none = Simulation(Model.from_xml_string(MODEL), 1)
     with pytest.raises(ValueError, match="body 'arm' is no mocap body; the model has none"):
         none.set_mocap(np.zeros((1, 3)), body="arm")
+
+
+def test_a_large_quaternion_is_a_rotation() -> None:
+    sim = Simulation(Model.from_xml_string(HAND), 1, isa="f64")
+    sim.set_mocap(quat=[[1e200] * 4], body="hand")
+    np.testing.assert_allclose(sim.mocap_quat[0, 0], 0.5)
+
+
+def test_masses_must_fit_single_precision() -> None:
+    sim = Simulation(Model.from_xml_string(MODEL), 1)
+    for wrong in (0.0, 1e39, 1e-46):
+        with pytest.raises(ValueError, match="expected a factor from 1e-30 to 1e30"):
+            sim.vary(mass=np.full((1, 4), wrong))
 
 
 def test_a_control_must_be_a_number() -> None:

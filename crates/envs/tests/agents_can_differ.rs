@@ -63,7 +63,7 @@ fn nonsense_is_refused() {
         assert!(text.contains(expected), "{text}");
     };
     says(N, &|_| {}, "agent is 20");
-    says(0, &|v| v.mass[1] = 0.0, "mass is 0, expected a factor above 0");
+    says(0, &|v| v.mass[1] = 0.0, "mass is 0, expected a factor from 1e-30 to 1e30");
     says(0, &|v| v.friction = f64::NAN, "friction is NaN");
     says(0, &|v| v.strength[0] = f64::INFINITY, "strength is inf");
     says(0, &|v| v.gravity[0] = f64::NAN, "gravity is NaN");

@@ -20,7 +20,7 @@ fn check(file: &str) {
     let mut batch = Batch::new(&model, &options).expect("supported");
     // some agents have their own constants and ground, which are part of their state
     let mut own = Variation::none(&model);
-    own.mass.fill(1.2);
+    own.mass.iter_mut().enumerate().for_each(|(body, factor)| *factor = 1.2 + 0.1 * (body % 3) as f64);
     own.friction = 0.7;
     batch.vary(3, &own);
     batch.push(4, 1, [1.0, 0.5, 0.2], [0.0, 0.1, 0.0]);

@@ -22,6 +22,9 @@ pub struct Pushes {
     pub each: Vec<(usize, [f64; 3], [f64; 3])>,
 }
 
+/// Largest coordinate of a mocap body, m: that of a valid state.
+const FARTHEST: f64 = 1e10;
+
 /// Poses of one mocap body of each selected agent.
 pub struct MocapPoses {
     /// Its number among the mocap bodies.
@@ -42,7 +45,10 @@ pub fn mocap_poses(
     let (body, chosen) = (model.body_index(body)?, self::mask(mask, n)?);
     let bodies: Vec<usize> = model.inner.mocap_bodies().collect();
     let Some(mocap) = bodies.iter().position(|b| *b == body) else {
-        let name = |b: &usize| format!("'{}'", model.inner.bodies[*b].name);
+        let name = |b: &usize| match model.inner.bodies[*b].name.as_str() {
+            "" => b.to_string(),
+            name => format!("'{name}'"),
+        };
         let valid = match bodies.len() {
             0 => "the model has none".to_owned(),
             _ => format!("those of the model are {}", bodies.iter().map(name).collect::<Vec<_>>().join(", ")),
@@ -60,11 +66,16 @@ pub fn mocap_poses(
         Some(x) => Err(error::value(format!("agent {agent}: {name} is {x}, expected finite numbers"))),
         None => Ok(()),
     };
+    let near = |agent: usize, pos: &[f64]| match pos.iter().find(|x| x.abs() > FARTHEST) {
+        Some(x) => Err(error::value(format!("agent {agent}: pos is {x}, expected at most {FARTHEST:e} m"))),
+        None => Ok(()),
+    };
     if let Some(pos) = pos {
         let pos = of_shape::<f64, Ix2, 2>("pos has", pos, [n, 3])?;
         for (agent, own, _) in &mut each {
             *own = [0, 1, 2].map(|i| pos.as_array()[[*agent, i]]);
             finite(*agent, "pos", own)?;
+            near(*agent, own)?;
         }
     }
     if let Some(quat) = quat {

@@ -32,7 +32,8 @@ impl AgentState {
     /// Whether its sizes fit this model. Otherwise it cannot be loaded into a `Batch`.
     pub fn fits(&self, model: &Model) -> bool {
         let Model { nu, bodies, .. } = model;
-        let varied = |v: &Variation| v.mass.len() == bodies.len() && v.strength.len() == *nu;
+        let varied =
+            |v: &Variation| v.mass.len() == bodies.len() && v.strength.len() == *nu && v.out_of_range().is_none();
         let grid = |(i, elevations): (usize, &Option<Vec<f32>>)| match (elevations, model.hfields.get(i)) {
             (Some(elevations), Some(field)) => elevations.len() == field.nrow * field.ncol,
             (Some(_), None) => false,

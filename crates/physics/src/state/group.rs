@@ -179,5 +179,11 @@ impl<T: Real> Group<T> {
 /// A normalized quaternion; the identity for zero.
 fn unit(q: &[f64; 4]) -> [f64; 4] {
     let n = q.iter().map(|x| x * x).sum::<f64>().sqrt();
-    if n > 1e-10 { q.map(|x| x / n) } else { [1.0, 0.0, 0.0, 0.0] }
+    // squares of large numbers overflow
+    let largest = q.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+    match n {
+        f64::INFINITY if largest.is_finite() => unit(&q.map(|x| x / largest)),
+        n if n > 1e-10 => q.map(|x| x / n),
+        _ => [1.0, 0.0, 0.0, 0.0],
+    }
 }

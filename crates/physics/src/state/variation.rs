@@ -43,10 +43,14 @@ impl Variation {
     pub fn out_of_range(&self) -> Option<(&'static str, f64, &'static str)> {
         let Variation { mass, friction, strength, gravity } = self;
         let first = |numbers: &[f64], valid: fn(f64) -> bool| numbers.iter().copied().find(|x| !valid(*x));
-        let mass = first(mass, |x| x.is_finite() && x > 0.0).map(|x| ("mass", x, "a factor above 0"));
-        let friction = || first(&[*friction], |x| x.is_finite() && x >= 0.0);
-        let strength = || first(strength, f64::is_finite).map(|x| ("strength", x, "a finite factor"));
-        let gravity = || first(gravity, f64::is_finite).map(|x| ("gravity", x, "finite numbers"));
+        // single precision has to hold them
+        const fn is_finite(x: f64) -> bool {
+            (x as f32).is_finite()
+        }
+        let mass = first(mass, |x| (1e-30..=1e30).contains(&x)).map(|x| ("mass", x, "a factor from 1e-30 to 1e30"));
+        let friction = || first(&[*friction], |x| is_finite(x) && x >= 0.0);
+        let strength = || first(strength, is_finite).map(|x| ("strength", x, "a finite factor"));
+        let gravity = || first(gravity, is_finite).map(|x| ("gravity", x, "finite numbers"));
         mass.or_else(|| friction().map(|x| ("friction", x, "a factor of 0 or more"))).or_else(strength).or_else(gravity)
     }
 }
@@ -91,9 +95,11 @@ impl<T: Real> Group<T> {
     /// no inverse.
     fn reweigh(&mut self, sim: &Sim<T>, lane: usize, masses: &[f64]) {
         let model = &sim.model;
-        // rounded like the masses, so that a state that was saved has the same
-        let factors: Vec<f64> = model.bodies.iter().map(|b| T::widen(T::scalar(masses[b.weld_id]))).collect();
-        let deviates = model.bodies.iter().zip(&factors).any(|(b, factor)| b.weld_id > 0 && *factor != 1.0);
+        // of moving bodies and rounded like their masses, so that a state that was saved has the same
+        let factor =
+            |weld: usize| if model.bodies[weld].dof_count > 0 { T::widen(T::scalar(masses[weld])) } else { 1.0 };
+        let factors: Vec<f64> = model.bodies.iter().map(|b| factor(b.weld_id)).collect();
+        let deviates = factors.iter().any(|factor| *factor != 1.0);
         let Some(varied) = &mut self.varied else { return };
         if !deviates && varied.weights.is_none() {
             return;
