@@ -811,8 +811,8 @@ class Simulation:
         change the softness of limits and contacts, too, as MuJoCo's ``mj_setConst`` does; muscles keep their forces.
 
         Args:
-            mass: factors of the bodies' masses and inertias, ``(num_envs, nbody)``. A body without joints has the factor of
-                the body that carries it, ``model.body_weld``.
+            mass: factors of the bodies' masses and inertias, ``(num_envs, nbody)``. A body without joints has the
+                factor of the body that carries it, ``model.body_weld``.
             friction: factors of all friction coefficients of contacts, ``(num_envs,)``.
             strength: factors of the actuators' forces, ``(num_envs, nu)``.
             gravity: gravity, m/s^2, ``(num_envs, 3)``.
