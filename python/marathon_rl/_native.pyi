@@ -788,7 +788,7 @@ class Simulation:
     ) -> None:
         """Move a mocap body of all agents or those of a mask until changed or until a reset.
 
-        It moves at once, without a velocity, and with it all that is attached to it. What is omitted stays.
+        It moves at once, without a velocity, and with it all that is attached to it. Omitted parts stay as they are.
 
         Args:
             pos: its position, m, ``(num_envs, 3)``.
