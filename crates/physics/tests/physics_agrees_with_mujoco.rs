@@ -279,9 +279,9 @@ fn physics_agrees_with_mujoco() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-/// Factor for models in which single precision loses digits: forces within a link mostly cancel, and a weld measures a small angle.
+/// Factor for a model in which single precision loses digits: forces within a link mostly cancel.
 fn slack(path: &Path) -> f64 {
-    if ["springs.xml", "mocap.xml"].iter().any(|name| path.ends_with(name)) { 10.0 } else { 1.0 }
+    if path.ends_with("springs.xml") { 10.0 } else { 1.0 }
 }
 
 #[test]
@@ -346,7 +346,7 @@ fn varied_agents_agree_with_an_edited_mujoco_model() {
     let mut failures = Vec::new();
     for (path, answer) in paths.iter().zip(answers.as_array().expect("a list")) {
         // in one state of this model, double precision loses five digits, too
-        let max = if path.ends_with("elliptic.xml") { 1e-1 } else { 1e-2 };
+        let max = if path.ends_with("elliptic.xml") { 6e-2 } else { 1e-2 };
         let bars = Bars { double: 1e-8, median: 5e-6 * slack(path), max, contacts: 0 };
         check(path, answer, false, &bars, &mut failures);
     }

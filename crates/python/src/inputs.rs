@@ -62,10 +62,6 @@ pub fn mocap_poses(
         let [p, q] = [3 * row(agent), 4 * row(agent)];
         each.push((agent, [of_pos[p], of_pos[p + 1], of_pos[p + 2]], [0, 1, 2, 3].map(|i| of_quat[q + i])));
     }
-    let finite = |agent: usize, name: &str, numbers: &[f64]| match numbers.iter().find(|x| !x.is_finite()) {
-        Some(x) => Err(error::value(format!("agent {agent}: {name} is {x}, expected finite numbers"))),
-        None => Ok(()),
-    };
     let near = |agent: usize, pos: &[f64]| match pos.iter().find(|x| x.abs() > FARTHEST) {
         Some(x) => Err(error::value(format!("agent {agent}: pos is {x}, expected at most {FARTHEST:e} m"))),
         None => Ok(()),
@@ -91,6 +87,14 @@ pub fn mocap_poses(
     Ok(MocapPoses { mocap, each })
 }
 
+/// Refuses numbers of an agent that are not finite.
+fn finite(agent: usize, name: &str, numbers: &[f64]) -> PyResult<()> {
+    match numbers.iter().find(|x| !x.is_finite()) {
+        Some(x) => Err(error::value(format!("agent {agent}: {name} is {x}, expected finite numbers"))),
+        None => Ok(()),
+    }
+}
+
 /// Reads the arguments of `push` for `n` agents.
 pub fn pushes(
     model: &Model,
@@ -105,9 +109,7 @@ pub fn pushes(
         let given = of_shape::<f64, Ix2, 2>(&format!("{name} has"), given, [n, 3])?;
         let vectors: Vec<[f64; 3]> = given.as_array().rows().into_iter().map(|v| [v[0], v[1], v[2]]).collect();
         for (agent, vector) in vectors.iter().enumerate().filter(|(agent, _)| chosen[*agent]) {
-            if let Some(x) = vector.iter().find(|x| !x.is_finite()) {
-                return Err(error::value(format!("agent {agent}: {name} is {x}, expected finite numbers")));
-            }
+            finite(agent, name, vector)?;
         }
         Ok(vectors)
     };

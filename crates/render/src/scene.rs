@@ -121,15 +121,16 @@ impl Scene {
         let mut shown = Vec::new();
         let mut planes = Vec::new();
         let mut fields = Vec::new();
-        for (index, geom) in model.geoms.iter().enumerate().filter(|(_, geom)| visible(geom)) {
+        // what is seen and what is touched is often the same mesh twice
+        let chosen = |(index, geom): &(usize, &Geom)| visible(geom) && !twin(model, *index, &visible);
+        for (index, geom) in model.geoms.iter().enumerate().filter(chosen) {
             if geom.kind == GeomType::Plane {
                 planes.push(ShownPlane { geom: index, half: [geom.size[0], geom.size[1]] });
             } else if geom.kind == GeomType::Hfield {
                 fields.push(index);
-            } else if twin(model, index, &visible) {
-                // what is seen and what is touched is often the same mesh twice
-            } else if let Some(shape) = shape_of(geom, mesh_of(geom).as_deref()) {
-                let mesh = mesh_of(geom);
+            }
+            let mesh = mesh_of(geom);
+            if let Some(shape) = shape_of(geom, mesh.as_deref()) {
                 let color = (geom.rgba != UNCHOSEN).then(|| {
                     let [r, g, b, _] = geom.rgba.map(f64::from);
                     DVec3::new(palette::to_linear(r), palette::to_linear(g), palette::to_linear(b))
