@@ -82,7 +82,6 @@ fn place_geoms<T: Real>(sim: &Sim<T>, work: &mut Work<T>) {
     for paired in &sim.contacts.paired {
         let (g, mount) = (paired.geom, &sim.geoms[paired.geom]);
         let (center, axis) = match mount.link {
-            None if mount.mocap.is_none() => (splat3(&mount.pos), splat3(&mount.rot[2])),
             None => (work.motion.still(mount), work.motion.axes(mount)[2]),
             Some(l) => (work.motion.arm(mount, l), rotate(&work.motion.rot[l], &splat3(&mount.rot[2]))),
         };

@@ -94,8 +94,7 @@ impl<T: Real> Violation<T> {
         let (z, one) = (T::zero(), T::lit(1.0));
         let frame = |i: usize| {
             let q = frames.quats[i].map(T::splat);
-            let carrier = points[i].link.or(work.motion.carrier(&points[i]));
-            carrier.map_or(q, |l| quat_mul(&rot_to_quat(&work.motion.rot[l]), &q))
+            work.motion.frame(&points[i]).map_or(q, |l| quat_mul(&rot_to_quat(&work.motion.rot[l]), &q))
         };
         let (q0, q1) = (frame(0), frame(1));
         let back = quat_conjugate(&q1);

@@ -98,6 +98,7 @@ impl Expansion<'_> {
                     let copy = numbered(&found[j], &names, suffix, i);
                     self.known.extend(named(section, &copy));
                     if alone(&copy) {
+                        self.library.room.take_document(&copy)?;
                         found.push(copy.clone());
                     }
                     self.root.children[last].children.push(copy);

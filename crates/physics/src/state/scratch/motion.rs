@@ -48,7 +48,7 @@ impl<T: Real> Motion<T> {
     /// Axes of a frame in the world.
     #[inline(always)]
     pub fn axes(&self, m: &Mount<T::Scalar>) -> Rot<T> {
-        match m.link.or(self.carrier(m)) {
+        match self.frame(m) {
             None => [splat3(&m.rot[0]), splat3(&m.rot[1]), splat3(&m.rot[2])],
             Some(l) => compose(&self.rot[l], &m.rot),
         }
@@ -57,15 +57,15 @@ impl<T: Real> Motion<T> {
     /// Position of a frame that no joint moves, in the world.
     #[inline(always)]
     pub fn still(&self, m: &Mount<T::Scalar>) -> V3<T> {
-        match self.carrier(m) {
+        match self.frame(m) {
             None => splat3(&m.pos),
             Some(mocap) => self.arm(m, mocap),
         }
     }
 
-    /// Index of the mocap body that carries a frame, among the frames of links and mocap bodies.
+    /// Index of the link or mocap body that carries a mount, in `rot` and `pos`.
     #[inline(always)]
-    pub fn carrier(&self, m: &Mount<T::Scalar>) -> Option<usize> {
-        m.mocap.map(|k| self.vel.len() + k)
+    pub fn frame(&self, m: &Mount<T::Scalar>) -> Option<usize> {
+        m.link.or(m.mocap.map(|k| self.vel.len() + k))
     }
 }
