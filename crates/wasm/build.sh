@@ -37,6 +37,7 @@ for module in "${@:-relaxed exact relaxed-play exact-play}"; do
     cp "$target/$lanes/wasm32-unknown-unknown/web/marathon_wasm.wasm" "npm/dist/$name.wasm"
   done
 done
+cp ../../LICENSE-* npm/
 cd npm
 [ -d node_modules ] || npm ci --no-audit --no-fund --silent
 npx tsc

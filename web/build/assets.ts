@@ -3,10 +3,11 @@
  * and some clips. The development server serves them from their place; a build copies them.
  */
 import { createHash } from "node:crypto";
-import { existsSync, readFileSync, readdirSync } from "node:fs";
+import { existsSync, readFileSync } from "node:fs";
 import { join } from "node:path";
 import type { Plugin } from "vite";
 import { CLIPS } from "../src/motion/samples.ts";
+import { FOLLOWER, POLICIES } from "../src/views/characters.ts";
 
 const MODULES = ["relaxed.wasm", "exact.wasm", "relaxed-play.wasm", "exact-play.wasm"];
 
@@ -25,9 +26,7 @@ export function repositoryAssets({ modules, policies, motions }: Folders): Plugi
   // path in the page to path on the disk
   const files = new Map<string, string>();
   for (const name of found) files.set(`${folder}/${name}`, join(modules, name));
-  for (const name of readdirSync(policies).filter((name) => name.endsWith(".safetensors"))) {
-    files.set(`policies/${name}`, join(policies, name));
-  }
+  for (const name of [...POLICIES, FOLLOWER.policy]) files.set(`policies/${name}.safetensors`, join(policies, `${name}.safetensors`));
   for (const name of CLIPS) files.set(`motions/${name}.motion`, join(motions, `${name}.motion`));
   return {
     name: "repository-assets",

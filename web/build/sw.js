@@ -2,6 +2,9 @@
 const CACHE = "marathon-__BUILD__";
 const FILES = ["__FILES__"];
 
+/** Whether a path is of the build. The list lacks the modules. */
+const ours = (path) => FILES.includes(path) || path.endsWith(".wasm");
+
 self.addEventListener("install", (event) => {
   const fill = async () => {
     const cache = await caches.open(CACHE);
@@ -37,7 +40,11 @@ self.addEventListener("message", (event) => {
 
 self.addEventListener("fetch", (event) => {
   const { request } = event;
-  if (request.method !== "GET" || !request.url.startsWith(self.registration.scope)) return;
+  const { scope } = self.registration;
+  if (request.method !== "GET" || !request.url.startsWith(scope)) return;
+  // streams and what a program serves are not of the build
+  const path = new URL(request.url).pathname.slice(new URL(scope).pathname.length);
+  if (request.cache === "no-store" || (request.mode !== "navigate" && !ours(path))) return;
   const page = request.mode === "navigate";
   const answer = async () => {
     const cache = await caches.open(CACHE);
@@ -49,7 +56,7 @@ self.addEventListener("fetch", (event) => {
     }
     try {
       const response = await fetch(request);
-      if (response.ok && response.type === "basic") await cache.put(key, response.clone());
+      if (response.ok && response.type === "basic") event.waitUntil(cache.put(key, response.clone()));
       return response;
     } catch (error) {
       const known = await cache.match(key, { ignoreSearch: true });

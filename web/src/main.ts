@@ -7,7 +7,7 @@ import { characterOf } from "./views/characters";
 const { view, params } = parseRoute(new URL(location.href));
 // the view handles their errors
 engine().catch(() => {});
-if (view === "play") policy(characterOf(params.get("agent")).policy).catch(() => {});
+if (view === "play") void (async () => policy(characterOf(params.get("agent")).policy))().catch(() => {});
 
 const { start } = await import("./app/shell");
 start(document.getElementById("app") ?? document.body);

@@ -116,7 +116,17 @@ impl Failure {
 
 impl<E: Display> From<E> for Failure {
     fn from(error: E) -> Self {
-        Failure { message: error.to_string(), missing: Vec::new() }
+        Failure { message: in_a_script(&error.to_string()), missing: Vec::new() }
+    }
+}
+
+/// A message without the advice that only a command line can follow.
+fn in_a_script(message: &str) -> String {
+    let message = message.replace("`marathon list`", "`agents()`");
+    let advice = message.split_once("; set MARATHON_LIMITS=");
+    match advice.and_then(|(before, rest)| Some((before, rest.split_once(" to raise it")?.1))) {
+        Some((before, after)) => format!("{before}{after}"),
+        None => message,
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::abi::respond;
 use crate::answer::{Answer, Failure, Request, numbers};
+use crate::hash;
 use crate::objects::{Kind, ask, keep, with};
 use crate::task_info;
 use marathon_envs::options::OF_LEARNING;
@@ -70,12 +71,12 @@ impl Default for EnvRequest {
 /// Reads a policy: Marathon's own file, or ONNX.
 pub fn read_policy(bytes: &[u8], env: Option<&VecEnv>) -> Result<Policy, Failure> {
     let name = "policy".as_ref();
-    // a tensor file starts with the length of its header, then a brace
-    let tensors = bytes.get(8).is_some_and(|byte| *byte == b'{');
-    Ok(match tensors {
-        true => Policy::from_bytes(name, bytes)?,
-        false => Policy::from_onnx(name, bytes, env.map(VecEnv::spec))?,
-    })
+    // a tensor file starts with the length of its header, then a brace; an ONNX file with the field of its version
+    match bytes {
+        [_, _, _, _, _, _, _, _, b'{', ..] => Ok(Policy::from_bytes(name, bytes)?),
+        [0x08, ..] => Ok(Policy::from_onnx(name, bytes, env.map(VecEnv::spec))?),
+        _ => Err("policy: the bytes are neither those of a .safetensors file nor those of an ONNX model".into()),
+    }
 }
 
 impl Kind for Env {
@@ -193,6 +194,11 @@ impl Env {
         Ok(self.env.step(&self.actions, &mut self.step)?)
     }
 
+    /// Numbers of agents and of their observations, which begin a snapshot.
+    fn sizes(&self) -> [u32; 2] {
+        [self.env.agents() as u32, self.env.spec().obs as u32]
+    }
+
     fn pose(&mut self) -> Result<(), Failure> {
         for agent in 0..self.env.agents() {
             self.poses.set(&self.model, agent, &self.env.state(agent)?.qpos);
@@ -210,6 +216,11 @@ impl Env {
         }
         Ok(numbers)
     }
+}
+
+/// Hash of observations.
+fn hash_of(obs: &[f32]) -> u64 {
+    hash(obs.iter().map(|x| f64::from(*x)))
 }
 
 /// Creates an environment; the answer has the facts of its task and model.
@@ -316,7 +327,11 @@ pub extern "C" fn env_command(env: usize, agent: usize) -> i32 {
         for (name, value) in &values {
             let Some(i) = ranges.iter().position(|range| range.name == *name) else {
                 let known = ranges.iter().map(|range| range.name.as_str()).collect::<Vec<_>>().join(", ");
-                return Err(format!("no command '{name}', expected one of {known}").into());
+                let expected = match known.is_empty() {
+                    true => "none: the task takes no commands".into(),
+                    false => format!("one of {known}"),
+                };
+                return Err(format!("no command '{name}', expected {expected}").into());
             };
             let number = value
                 .as_f64()
@@ -391,11 +406,14 @@ pub extern "C" fn env_set_ground(env: usize, agent: usize, field: usize) -> i32 
     })
 }
 
-/// The complete state of all agents: their observations in single precision, then what [`VecEnv::save`] writes.
+/// The complete state of all agents: their sizes, the hash of their observations, the observations in single precision, then
+/// what [`VecEnv::save`] writes.
 #[unsafe(no_mangle)]
 pub extern "C" fn env_save(env: usize) -> i32 {
     ask::<Env>(env, |env, _| {
-        let mut bytes: Vec<u8> = env.step.obs.iter().flat_map(|x| x.to_le_bytes()).collect();
+        let sizes = env.sizes().into_iter().flat_map(u32::to_le_bytes);
+        let obs = env.step.obs.iter().flat_map(|x| x.to_le_bytes());
+        let mut bytes: Vec<u8> = sizes.chain(hash_of(&env.step.obs).to_le_bytes()).chain(obs).collect();
         bytes.extend(env.env.save());
         Ok(Answer::bytes(bytes))
     })
@@ -406,11 +424,26 @@ pub extern "C" fn env_save(env: usize) -> i32 {
 pub extern "C" fn env_load(env: usize) -> i32 {
     ask::<Env>(env, |env, mut request| {
         let bytes = request.take_file("snapshot").unwrap_or_default();
-        let split = bytes.split_at_checked(size_of_val(&env.step.obs[..]));
-        let (obs, state) = split.ok_or_else(|| Failure::from("this snapshot is of another environment"))?;
+        let foreign = || Failure::from("these bytes are not a snapshot of an environment");
+        let (sizes, rest) = bytes.split_first_chunk::<8>().ok_or_else(foreign)?;
+        let (expected_hash, rest) = rest.split_first_chunk::<8>().ok_or_else(foreign)?;
+        let [agents, observations] =
+            [0, 4].map(|i| u32::from_le_bytes([sizes[i], sizes[i + 1], sizes[i + 2], sizes[i + 3]]));
+        let expected = env.sizes();
+        if [agents, observations] != expected {
+            return Err(format!(
+                "the snapshot has {agents} agents of {observations} observations, expected {} of {}",
+                expected[0], expected[1]
+            )
+            .into());
+        }
+        let (obs, state) = rest.split_at_checked(size_of_val(&env.step.obs[..])).ok_or_else(foreign)?;
+        let obs: Vec<f32> = obs.as_chunks::<4>().0.iter().map(|x| f32::from_le_bytes(*x)).collect();
+        if hash_of(&obs) != u64::from_le_bytes(*expected_hash) {
+            return Err("the snapshot is damaged: its observations do not have its hash".into());
+        }
         env.env.load(state)?;
-        let obs = obs.as_chunks::<4>().0.iter().map(|x| f32::from_le_bytes(*x));
-        env.step.obs.iter_mut().zip(obs).for_each(|(to, from)| *to = from);
+        env.step.obs.copy_from_slice(&obs);
         Answer::done()
     })
 }

@@ -31,11 +31,30 @@ impl Training {
         let config = if config.is_null() { json!({}) } else { config };
         let mut loaded = parse_object("config", &config.to_string(), &agent)?;
         loaded.config.run.threads = 1;
+        let network = &loaded.config.network;
+        for hidden in [&network.hidden[..], network.critic()] {
+            fits(hidden)?;
+        }
         let mut options = Options::new();
         loaded.options.into_iter().for_each(|(name, value)| options.set(&name, value));
         let factory = marathon_envs::factory_with(&agent, &options, Isa::best())?;
         Ok(Training { run: TrainLoop::new(&*factory, Isa::best(), &loaded.config)? })
     }
+}
+
+/// Most weights between two hidden layers: 32-bit sizes and a memory of 4 GB hold no more.
+const MOST_WEIGHTS: f64 = 1e8;
+
+/// Checks that the weights of hidden layers can be counted here.
+fn fits(hidden: &[usize]) -> Result<(), Failure> {
+    let most = hidden.windows(2).map(|pair| pair[0] as f64 * pair[1] as f64).fold(0.0, f64::max);
+    let widest = hidden.iter().fold(0.0, |most: f64, n| most.max(*n as f64));
+    if most.max(1000.0 * widest) > MOST_WEIGHTS {
+        return Err(
+            format!("network.hidden is {hidden:?}, expected layers with at most 1e8 weights between them").into()
+        );
+    }
+    Ok(())
 }
 
 /// Creates a run of the task `agent`; the answer has its configuration.

@@ -51,8 +51,30 @@ export async function fetchBytes(url: URL, limit = 64e6): Promise<Uint8Array> {
   }
   if (!response.ok) throw new Error(`${url.href} cannot be loaded: status ${response.status}`);
   if (Number(response.headers.get("content-length") ?? 0) > limit) throw tooLarge(url.href, limit);
-  const bytes = new Uint8Array(await response.arrayBuffer());
-  if (bytes.length > limit) throw tooLarge(url.href, limit);
+  return readAtMost(response, limit);
+}
+
+/** Reads an answer, and stops at the limit: not every server tells the size before. */
+async function readAtMost(response: Response, limit: number): Promise<Uint8Array> {
+  const reader = response.body?.getReader();
+  const parts: Uint8Array[] = [];
+  let length = 0;
+  while (reader) {
+    const { done, value } = await reader.read();
+    if (done) break;
+    length += value.length;
+    if (length > limit) {
+      await reader.cancel();
+      throw tooLarge(response.url, limit);
+    }
+    parts.push(value);
+  }
+  const bytes = new Uint8Array(length);
+  let at = 0;
+  for (const part of parts) {
+    bytes.set(part, at);
+    at += part.length;
+  }
   return bytes;
 }
 

@@ -46,19 +46,21 @@ export function isEmbedded(url: URL): boolean {
 
 /** Options of a task in a link: `option=difficulty=0.5&option=course=steps`. */
 export function optionsOf(params: URLSearchParams): Record<string, OptionValue> {
-  const options: Record<string, OptionValue> = {};
+  const options = new Map<string, OptionValue>();
   for (const text of params.getAll("option")) {
     const [name = "", ...rest] = text.split("=");
     const value = rest.join("=");
     const number = value.trim() === "" ? Number.NaN : Number(value);
-    options[name] = value === "true" || value === "false" ? value === "true" : Number.isFinite(number) ? number : value;
+    options.set(name, value === "true" || value === "false" ? value === "true" : Number.isFinite(number) ? number : value);
   }
-  return options;
+  return Object.fromEntries(options);
 }
 
-/** A whole number of an address, within limits. */
+/** A whole number of an address. */
 export function integer(params: URLSearchParams, name: string, low: number, high: number, otherwise: number): number {
   const text = params.get(name);
-  const value = text === null || text.trim() === "" ? Number.NaN : Number(text);
-  return Number.isInteger(value) ? Math.min(Math.max(value, low), high) : otherwise;
+  if (text === null) return otherwise;
+  const value = text.trim() === "" ? Number.NaN : Number(text);
+  if (Number.isInteger(value) && value >= low && value <= high) return value;
+  throw new Error(`${name} is '${text}', expected a whole number from ${low} to ${high}`);
 }

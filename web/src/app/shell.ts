@@ -47,6 +47,12 @@ declare global {
   }
 }
 
+/** A view with the files that it was opened for. */
+interface Shown {
+  readonly route: Route;
+  readonly files: readonly GivenFile[];
+}
+
 class Shell {
   readonly #messages = new Messages();
   readonly #theme = new ThemeSwitch();
@@ -59,6 +65,9 @@ class Shell {
   readonly #stage: Stage;
   readonly #handle: PageHandle;
   #route: Route = parseRoute(new URL(location.href));
+  /** What is shown, and what was shown before. */
+  #shown: Shown | null = null;
+  #before: Shown | null = null;
   /** Number of the view that is being opened. */
   #turn = 0;
 
@@ -134,6 +143,7 @@ class Shell {
     const turn = ++this.#turn;
     const gone = (): boolean => turn !== this.#turn;
     this.#route = route;
+    this.#messages.clear();
     this.#close();
     for (const [view, link] of this.#links) {
       if (view === route.view) link.setAttribute("aria-current", "page");
@@ -145,7 +155,7 @@ class Shell {
     document.title = `${NAMES[route.view]} · Marathon`;
     this.#overlay.append(el("p", { class: "loading", role: "status" }, "Loading"));
     try {
-      const [marathon, make] = await Promise.all([engine(), LOADERS[route.view]()]);
+      const [marathon, make] = await Promise.all([engine(), LOADERS[route.view]().catch(reload)]);
       if (gone()) return;
       this.#overlay.replaceChildren();
       const view = await make({
@@ -159,7 +169,12 @@ class Shell {
           if (gone()) throw new Error("this view has been left");
         },
         say: (text, kind) => this.#messages.say(text, kind),
-        fail: (error) => this.#fail(error),
+        fail: (error) => {
+          if (!gone()) this.#fail(error);
+        },
+        giveUp: (error) => {
+          if (!gone()) void this.#goBack(error, this.#route, this.#before);
+        },
         link: (settings) => this.#link(settings),
         open: (name, params, given = []) => this.#go({ view: name, params: new URLSearchParams(params) }, given),
         openFiles: (given) => this.#openFiles(given),
@@ -170,18 +185,37 @@ class Shell {
       }
       this.#handle.view = view;
       this.#handle.name = route.view;
+      this.#before = this.#shown;
+      this.#shown = { route: this.#route, files };
       document.documentElement.dataset["ready"] = route.view;
       performance.mark("marathon-ready");
     } catch (error) {
       if (gone()) return;
       this.#overlay.replaceChildren();
-      this.#fail(error);
+      await this.#goBack(error, route, this.#shown);
     }
+  }
+
+  /** Says why a view failed, and shows what there was before, or that view without its settings. */
+  async #goBack(error: unknown, failed: Route, before: Shown | null): Promise<void> {
+    this.#shown = this.#before = null;
+    // without settings there is nothing to go back to
+    if (!isLost(error) && (before !== null || failed.params.size > 0)) {
+      const { route, files } = before ?? { route: { view: failed.view, params: new URLSearchParams() }, files: [] };
+      history.replaceState(null, "", linkOf(route));
+      await this.#open(route, files);
+    }
+    this.#fail(error);
   }
 
   #close(): void {
     delete document.documentElement.dataset["ready"];
-    this.#handle.view?.dispose();
+    try {
+      this.#handle.view?.dispose();
+    } catch (error) {
+      // what a module held is gone with it
+      if (!isLost(error)) throw error;
+    }
     this.#handle.view = this.#handle.name = null;
     this.#stage.clear();
     this.#panel.replaceChildren();
@@ -208,9 +242,14 @@ class Shell {
   #fail(error: unknown): void {
     const text = reason(error);
     this.#messages.say(text, "error");
-    if (!/module has stopped|out of memory|unreachable/.test(text)) return;
+    if (!isLost(error)) return;
     // the instance is lost, but not its code
-    void restartEngine().then(() => this.#open({ view: this.#route.view, params: new URLSearchParams() }, []));
+    const again = async (): Promise<void> => {
+      await restartEngine();
+      await this.#open({ view: this.#route.view, params: new URLSearchParams() }, []);
+      this.#messages.say(text, "error");
+    };
+    again().catch((failure: unknown) => this.#messages.say(`${text} (${reason(failure)})`, "error"));
   }
 
   async #copyLink(): Promise<void> {
@@ -267,6 +306,28 @@ class Shell {
       this.#messages.say(`${first.path} is not a model (.xml), a recording (.bvh, .glb, .gltf) or a policy (.safetensors, .onnx).`, "error");
     }
   }
+}
+
+/** Key of the time of the last reload, ms. */
+const RELOADED = "marathon.reloaded";
+
+/** The code of a view cannot be loaded: with a newer build its name is another one, so the page is loaded again, once. */
+function reload(error: unknown): never {
+  const now = Date.now();
+  try {
+    if (now - Number(sessionStorage.getItem(RELOADED) ?? 0) > 60_000) {
+      sessionStorage.setItem(RELOADED, String(now));
+      location.reload();
+    }
+  } catch {
+    // without storage the page could reload for ever
+  }
+  throw new Error(`this part of the page cannot be loaded; load the page again (${reason(error)})`);
+}
+
+/** Whether the module has stopped. */
+function isLost(error: unknown): boolean {
+  return /module has stopped|out of memory|unreachable/.test(reason(error));
 }
 
 /** Whether the panel has no place beside the figure. */

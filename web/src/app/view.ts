@@ -20,6 +20,8 @@ export interface Context {
   say(text: string, kind?: Kind): void;
   /** Says why something failed, and replaces a module that has stopped. */
   fail(error: unknown): void;
+  /** Says why the view cannot show what it was opened for, and goes back to what there was before. */
+  giveUp(error: unknown): void;
   /** Writes settings into the link of the view. `null` removes one. */
   link(settings: Readonly<Record<string, string | null>>): void;
   /** Goes to another view. */

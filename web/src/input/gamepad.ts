@@ -24,13 +24,14 @@ const ACTIONS: readonly (readonly [number, Action])[] = [
 export class Gamepads implements Device {
   readonly #onAction: OnAction;
   #pressed = new Set<number>();
+  #forbidden = false;
 
   constructor(onAction: OnAction) {
     this.#onAction = onAction;
   }
 
   read(): Deflection {
-    const pad = navigator.getGamepads?.().find((pad) => pad?.connected === true);
+    const pad = this.#pad();
     if (!pad) return REST;
     const pressed = new Set(pad.buttons.flatMap((button, i) => (button.pressed || button.value > 0.5 ? [i] : [])));
     for (const [button, action] of ACTIONS) {
@@ -48,6 +49,17 @@ export class Gamepads implements Device {
   }
 
   dispose(): void {}
+
+  #pad(): Gamepad | null {
+    if (this.#forbidden) return null;
+    try {
+      return navigator.getGamepads?.().find((pad) => pad?.connected === true) ?? null;
+    } catch {
+      // the page's host does not allow them
+      this.#forbidden = true;
+      return null;
+    }
+  }
 }
 
 /** The response to a deflection. */

@@ -1,5 +1,6 @@
 /** Mouse and fingers on the picture: pull a limb, push it by a click, turn the camera, zoom. */
 import { Plane, Raycaster, Vector2, Vector3 } from "three";
+import { isEmbedded } from "../app/route";
 import type { Picked } from "../scene/rods";
 import type { Stage } from "../scene/stage";
 import type { Ray } from "three";
@@ -47,7 +48,10 @@ export class PointerControl {
     canvas.addEventListener("pointerup", (event) => this.#up(event), { signal });
     canvas.addEventListener("pointercancel", (event) => this.#up(event), { signal });
     canvas.addEventListener("contextmenu", (event) => event.preventDefault(), { signal });
+    const embedded = isEmbedded(new URL(location.href));
     const wheel = (event: WheelEvent): void => {
+      // the wheel scrolls the page around it until the picture is clicked
+      if (embedded && !event.ctrlKey && document.activeElement !== canvas) return;
       stage.follow.zoom(Math.exp(0.0012 * event.deltaY * (event.deltaMode === 1 ? 30 : 1)));
       event.preventDefault();
     };

@@ -19,15 +19,21 @@ export function keep(name: string, bytes: Uint8Array): void {
 }
 
 export function kept(): Kept[] {
+  let keys: string[];
   try {
-    const names = Object.keys(localStorage).filter((key) => key.startsWith(PREFIX));
-    return names.sort().map((key) => {
-      const bytes = Uint8Array.from(atob(localStorage.getItem(key) ?? ""), (character) => character.charCodeAt(0));
-      return { name: key.slice(PREFIX.length), bytes };
-    });
+    keys = Object.keys(localStorage).filter((key) => key.startsWith(PREFIX));
   } catch {
     return [];
   }
+  return keys.sort().flatMap((key) => {
+    try {
+      const bytes = Uint8Array.from(atob(localStorage.getItem(key) ?? ""), (character) => character.charCodeAt(0));
+      return [{ name: key.slice(PREFIX.length), bytes }];
+    } catch {
+      // not of this page
+      return [];
+    }
+  });
 }
 
 export function forget(name: string): void {

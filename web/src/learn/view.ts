@@ -1,6 +1,5 @@
 /** Learn: a figure learns from nothing in a worker, while figures on the screen act by its newest policy. */
 import { button, download, el, select } from "../app/dom";
-import { MODULES } from "../app/engine";
 import { reason } from "../app/messages";
 import { integer } from "../app/route";
 import type { Context, View } from "../app/view";
@@ -8,7 +7,7 @@ import { NO_HANDS, PointerControl } from "../input/pointer";
 import { type Chart, returnChart, speedChart } from "./chart";
 import { Crowd } from "./crowd";
 import { keep } from "./kept";
-import type { FromWorker, ToWorker } from "./messages";
+import { type Phase, type Plan, type Point, Run, latestRun } from "./run";
 
 interface Task {
   readonly name: string;
@@ -27,7 +26,8 @@ const TASKS: readonly Task[] = [
   { name: "ant", label: "Ant", agent: "Ant-v0", agents: 8, gap: 2.2, distance: 14, millions: 6 },
 ];
 
-type Phase = "ready" | "running" | "paused" | "done";
+/** Fewest and most decisions of a run. */
+const DECISIONS = { low: 10_000, high: 1e9 };
 
 class Learn implements View {
   readonly #context: Context;
@@ -39,20 +39,21 @@ class Learn implements View {
   readonly #numbers = el("p", { class: "numbers", role: "status" });
   readonly #main: HTMLButtonElement;
   readonly #after: HTMLButtonElement[];
-  #worker: Worker | null = null;
-  #policy: Uint8Array | null = null;
-  #phase: Phase = "ready";
+  #run: Run | null = null;
   #seed: number;
   #steps: number;
 
   constructor(context: Context) {
     this.#context = context;
     const { params, stage, marathon } = context;
-    const task = TASKS.find(({ name }) => name === params.get("agent")) ?? TASKS[0];
-    if (!task) throw new Error("there are no tasks");
+    // without settings in the link, the view shows the training that is there
+    const last = ["agent", "seed", "steps"].some((name) => params.has(name)) ? null : (latestRun()?.plan ?? null);
+    const named = params.get("agent") ?? TASKS.find(({ agent }) => agent === last?.agent)?.name ?? TASKS[0]?.name;
+    const task = TASKS.find(({ name }) => name === named);
+    if (!task) throw new Error(`agent is '${named}', expected ${TASKS.map(({ name }) => name).join(", ")}`);
     this.#task = task;
-    this.#seed = integer(params, "seed", 0, 2 ** 31 - 1, 1);
-    this.#steps = integer(params, "steps", 10_000, 1e9, 1e6 * task.millions);
+    this.#seed = integer(params, "seed", 0, 2 ** 31 - 1, last?.seed ?? 1);
+    this.#steps = integer(params, "steps", DECISIONS.low, DECISIONS.high, last?.steps ?? 1e6 * task.millions);
     this.#crowd = new Crowd(stage, marathon, { ...task, seed: this.#seed, onError: (error) => context.fail(error) });
     this.#pointer = new PointerControl(stage, NO_HANDS);
     stage.follow.set("side", task.distance);
@@ -70,31 +71,39 @@ class Learn implements View {
     this.#fill();
     this.#update();
     stage.show(this.#crowd);
-    if (params.get("start") === "1") this.#start();
+    const run = latestRun(this.#plan);
+    if (run) this.#attach(run);
+    else if (params.get("start") === "1") this.#start();
   }
 
   /** Numbers for tests. */
-  get progress(): { readonly phase: Phase; readonly first: number | null; readonly last: number | null; readonly text: string } {
-    return { phase: this.#phase, first: this.#returns.first, last: this.#returns.last, text: this.#numbers.textContent ?? "" };
+  get progress(): { readonly phase: Phase | "ready"; readonly first: number | null; readonly last: number | null; readonly text: string } {
+    return { phase: this.#run?.phase ?? "ready", first: this.#returns.first, last: this.#returns.last, text: this.#numbers.textContent ?? "" };
   }
 
   dispose(): void {
-    this.#worker?.terminate();
+    if (this.#run) {
+      this.#run.listener = null;
+      this.#run.pause();
+    }
     this.#pointer.dispose();
     this.#crowd.dispose();
   }
 
   #fill(): void {
     const { panel, marathon, open } = this.#context;
-    const number = (label: string, value: number, low: number, set: (value: number) => void): HTMLElement => {
+    const number = (label: string, value: number, low: number, high: number, set: (value: number) => void): HTMLElement => {
       const input = el("input", {
         type: "number",
         min: low,
+        max: high,
         step: 1,
         value,
         change: () => {
-          if (Number.isInteger(input.valueAsNumber) && input.valueAsNumber >= low) set(input.valueAsNumber);
-          else input.value = String(value);
+          const whole = Number.isInteger(input.valueAsNumber) && input.valueAsNumber >= low && input.valueAsNumber <= high;
+          if (whole) set((value = input.valueAsNumber));
+          else this.#context.say(`${label} is ${input.value || "not a number"}, expected ${low} to ${high}`, "error");
+          if (!whole) input.value = String(value);
         },
       });
       return el("label", { class: "field" }, el("span", {}, label), input);
@@ -108,11 +117,11 @@ class Learn implements View {
         "div",
         { class: "trio" },
         select("Body", TASKS.map(({ name, label }) => ({ value: name, label })), this.#task.name, (name) => open("learn", { agent: name })),
-        number("Seed", this.#seed, 0, (seed) => {
+        number("Seed", this.#seed, 0, 2 ** 31 - 1, (seed) => {
           this.#seed = seed;
           this.#context.link({ seed: String(seed) });
         }),
-        number("Decisions", this.#steps, 10_000, (steps) => {
+        number("Decisions", this.#steps, DECISIONS.low, DECISIONS.high, (steps) => {
           this.#steps = steps;
           this.#context.link({ steps: String(steps) });
         }),
@@ -123,96 +132,72 @@ class Learn implements View {
     );
   }
 
+  get #plan(): Plan {
+    return { agent: this.#task.agent, seed: this.#seed, steps: this.#steps };
+  }
+
   #press(): void {
-    switch (this.#phase) {
-      case "ready":
-      case "done":
-        this.#start();
-        break;
-      case "running":
-        this.#tell({ type: "pause" });
-        this.#set("paused");
-        break;
-      case "paused":
-        this.#tell({ type: "continue" });
-        this.#set("running");
-        break;
-    }
+    if (this.#run?.phase === "running") this.#run.pause();
+    else if (this.#run?.phase === "paused") this.#run.resume();
+    else this.#start();
   }
 
   #start(): void {
-    const { marathon } = this.#context;
-    this.#worker?.terminate();
-    this.#returns.clear(this.#steps);
-    this.#speeds.clear(this.#steps);
-    this.#worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
-    this.#worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.#take(data);
-    this.#worker.onerror = (event) => this.#stop(event.message || "the training cannot start");
-    const config = { run: { total_steps: this.#steps, seed: this.#seed } };
-    this.#tell({ type: "start", base: MODULES, lanes: marathon.lanes, agent: this.#task.agent, config });
-    this.#set("running");
+    this.#attach(new Run(this.#plan, this.#context.marathon.lanes));
   }
 
-  #tell(message: ToWorker): void {
-    this.#worker?.postMessage(message);
-  }
-
-  #take(message: FromWorker): void {
-    switch (message.type) {
-      case "point": {
-        const { steps, return_mean, speed_mean, fall_fraction } = message.iteration;
-        this.#returns.add(steps, return_mean);
-        this.#speeds.add(steps, speed_mean);
-        const rate = steps / Math.max(message.seconds, 1e-3);
-        const falls = fall_fraction === null ? "" : ` · ${(100 * fall_fraction).toFixed(0)} % falls`;
-        const count = steps < 1e6 ? `${(steps / 1e3).toFixed(0)} k` : `${(steps / 1e6).toFixed(2)} M`;
-        this.#numbers.textContent = `${count} decisions · ${(rate / 1e3).toFixed(1)} k/s${falls}`;
-        break;
-      }
-      case "policy":
-        this.#policy = message.bytes;
-        try {
-          this.#crowd.env.setPolicy(message.bytes);
-        } catch (error) {
-          this.#context.fail(error);
-        }
-        if (message.done) {
-          this.#set("done");
-          this.#context.say("The training is done.");
-        }
+  /** Shows a training and what it has learned so far. */
+  #attach(run: Run): void {
+    this.#run = run;
+    this.#returns.clear(run.plan.steps);
+    this.#speeds.clear(run.plan.steps);
+    for (const point of run.points) this.#draw(point);
+    if (run.policy) this.#act(run.policy);
+    run.listener = {
+      point: (point) => this.#draw(point),
+      learned: (policy) => this.#act(policy),
+      changed: (message) => {
+        if (message !== undefined) this.#context.say(message, "error");
+        if (run.phase === "done") this.#context.say("The training is done.");
         this.#update();
-        break;
-      case "error":
-        this.#stop(message.message);
+      },
+    };
+    this.#update();
+  }
+
+  #draw({ iteration, seconds }: Point): void {
+    const { steps, return_mean, speed_mean, fall_fraction } = iteration;
+    this.#returns.add(steps, return_mean);
+    this.#speeds.add(steps, speed_mean);
+    const rate = steps / Math.max(seconds, 1e-3);
+    const falls = fall_fraction === null ? "" : ` · ${(100 * fall_fraction).toFixed(0)} % falls`;
+    const count = steps < 1e6 ? `${(steps / 1e3).toFixed(0)} k` : `${(steps / 1e6).toFixed(2)} M`;
+    this.#numbers.textContent = `${count} decisions · ${(rate / 1e3).toFixed(1)} k/s${falls}`;
+  }
+
+  #act(policy: Uint8Array): void {
+    try {
+      this.#crowd.env.setPolicy(policy);
+    } catch (error) {
+      this.#context.fail(error);
     }
-  }
-
-  #stop(message: string): void {
-    this.#worker?.terminate();
-    this.#worker = null;
-    this.#set("ready");
-    this.#context.say(message, "error");
-  }
-
-  #set(phase: Phase): void {
-    this.#phase = phase;
     this.#update();
   }
 
   #update(): void {
-    const labels: Record<Phase, string> = { ready: "Start", running: "Pause", paused: "Continue", done: "Train again" };
-    this.#main.textContent = labels[this.#phase];
-    for (const item of this.#after) item.disabled = this.#policy === null;
+    const labels: Record<Phase | "ready", string> = { ready: "Start", running: "Pause", paused: "Continue", done: "Train again", failed: "Start" };
+    this.#main.textContent = labels[this.#run?.phase ?? "ready"];
+    for (const item of this.#after) item.disabled = !this.#run?.policy;
   }
 
   get #name(): string {
-    return `${this.#task.name}-seed${this.#seed}`;
+    return `${this.#task.name}-seed${this.#run?.plan.seed ?? this.#seed}`;
   }
 
   #keep(): void {
-    if (!this.#policy) return;
+    if (!this.#run?.policy) return;
     try {
-      keep(this.#name, this.#policy);
+      keep(this.#name, this.#run.policy);
       this.#context.say(`${this.#name} is kept in this browser. The view Policies lists it.`);
     } catch (error) {
       this.#context.say(`The policy cannot be kept: ${reason(error)}`, "error");
@@ -220,11 +205,12 @@ class Learn implements View {
   }
 
   #download(): void {
-    if (this.#policy) download(`${this.#name}.safetensors`, this.#policy);
+    if (this.#run?.policy) download(`${this.#name}.safetensors`, this.#run.policy);
   }
 
   #watch(): void {
-    if (this.#policy) this.#context.open("policies", {}, [{ path: `${this.#name}.safetensors`, bytes: this.#policy }]);
+    const policy = this.#run?.policy;
+    if (policy) this.#context.open("policies", {}, [{ path: `${this.#name}.safetensors`, bytes: policy }]);
   }
 }
 

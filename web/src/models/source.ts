@@ -50,24 +50,24 @@ function mainModel(files: readonly GivenFile[]): GivenFile | undefined {
 }
 
 async function open(marathon: Marathon, xml: string, name: string, find: Find): Promise<Opened> {
-  const given: Record<string, Uint8Array> = {};
+  const given = new Map<string, Uint8Array>();
   let bytes = 0;
   for (let round = 0; ; round++) {
     try {
-      return { simulation: marathon.simulation(xml, given, name), name };
+      return { simulation: marathon.simulation(xml, Object.fromEntries(given), name), name };
     } catch (error) {
       if (!(error instanceof MarathonError)) throw error;
-      const asked = error.missing.filter((path) => given[path] === undefined);
+      const asked = error.missing.filter((path) => !given.has(path));
       if (asked.length === 0 || round >= MOST_ROUNDS) throw error;
       const found = await Promise.all(asked.map(async (path) => [path, await find(path)] as const));
       const absent = found.filter(([, file]) => file === null).map(([path]) => path);
       if (absent.length > 0) throw new Error(`${name} needs ${list(absent)}: drop the whole folder`);
       for (const [path, file] of found) {
         if (file === null) continue;
-        given[path] = file;
+        given.set(path, file);
         bytes += file.length;
       }
-      if (bytes > MOST_BYTES || Object.keys(given).length > MOST_FILES) throw new Error(`the files of ${name} are too large`);
+      if (bytes > MOST_BYTES || given.size > MOST_FILES) throw new Error(`the files of ${name} are too large`);
     }
   }
 }

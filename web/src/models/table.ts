@@ -9,6 +9,8 @@ import { Terrain } from "../scene/terrain";
 
 /** Time between two forces of the hand, s. */
 const PERIOD = 0.01;
+/** Most physics steps in this time. A model with a smaller timestep moves in slow motion. */
+const MOST_STEPS = 1000;
 
 export class Table implements Actor {
   readonly puppet: Puppet;
@@ -27,7 +29,7 @@ export class Table implements Actor {
     this.#simulation = simulation;
     this.#onError = onError;
     const { model } = simulation;
-    this.#steps = Math.max(Math.round(PERIOD / model.timestep), 1);
+    this.#steps = Math.min(Math.max(Math.round(PERIOD / model.timestep), 1), MOST_STEPS);
     const dt = this.#steps * model.timestep;
     this.clock = new Clock(dt);
     this.puppet = new Puppet(stage, simulation, dt, false);

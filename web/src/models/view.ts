@@ -37,20 +37,15 @@ class Models implements View {
   async show(): Promise<void> {
     const { panel, stay } = this.#context;
     panel.replaceChildren(el("h2", {}, "Models"));
+    const { simulation, name } = await this.#find();
     try {
-      const { simulation, name } = await this.#find();
-      try {
-        stay();
-      } catch (error) {
-        simulation.free();
-        throw error;
-      }
-      this.#lay(simulation);
-      panel.append(el("h3", {}, name), this.#facts(simulation), this.#controls(simulation));
-    } catch (error) {
       stay();
-      this.#context.fail(error);
+    } catch (error) {
+      simulation.free();
+      throw error;
     }
+    this.#lay(simulation);
+    panel.append(el("h3", {}, name), this.#facts(simulation), this.#controls(simulation));
     this.#fill();
   }
 
@@ -88,7 +83,7 @@ class Models implements View {
     return el(
       "div",
       {},
-      el("p", {}, `${model.bodies.length - 1} bodies, ${model.nv} degrees of freedom, ${model.actuators.length} actuators, ${(1000 * model.timestep).toFixed(1)} ms a step`),
+      el("p", {}, `${[count(model.bodies.length - 1, "body", "bodies"), count(model.nv, "degree of freedom", "degrees of freedom"), count(model.actuators.length, "actuator")].join(", ")}, ${(1000 * model.timestep).toFixed(1)} ms a step`),
       boxes > 0 && el("p", { class: "notice" }, "Meshes without files are not shown."),
     );
   }
@@ -145,6 +140,10 @@ class Models implements View {
       form,
     );
   }
+}
+
+function count(number: number, one: string, more = `${one}s`): string {
+  return `${number} ${number === 1 ? one : more}`;
 }
 
 export function makeModels(context: Context): Promise<View> {

@@ -8,12 +8,11 @@ import { Keyboard } from "../input/keyboard";
 import { NO_HANDS, PointerControl } from "../input/pointer";
 import { Player } from "../play/player";
 import { ClipPlayer } from "./clip";
+import { FOLLOWER } from "../views/characters";
 import { type Import, startImport } from "./import";
 import { CLIPS } from "./samples";
 
 const CHARACTER = "MarathonMan";
-/** Task in which a policy follows clips, and its policy. */
-const FOLLOWER = { agent: "MarathonMan-v0", policy: "MarathonMan" };
 /** Largest recording, bytes. */
 const MOST = 64e6;
 
@@ -34,18 +33,13 @@ class Motion implements View {
   }
 
   async show(): Promise<void> {
-    const { panel, stay, fail } = this.#context;
+    const { panel, stay } = this.#context;
     panel.replaceChildren(el("h2", {}, "Motion"), this.#main);
     this.#fill();
-    try {
-      const [recording, files] = await this.#find();
-      stay();
-      if (extension(recording.path) === "motion") this.#show(recording.path, recording.bytes, []);
-      else void this.#read(recording, files);
-    } catch (error) {
-      stay();
-      fail(error);
-    }
+    const [recording, files] = await this.#find();
+    stay();
+    if (extension(recording.path) === "motion") this.#show(recording.path, recording.bytes, []);
+    else void this.#read(recording, files);
   }
 
   /** Whether a recording is being imported. */
@@ -74,7 +68,7 @@ class Motion implements View {
 
   /** Imports a recording, and shows the clip when it is there. */
   async #read({ path, bytes }: GivenFile, files: readonly GivenFile[]): Promise<void> {
-    const { marathon, stay, fail } = this.#context;
+    const { marathon, stay, giveUp } = this.#context;
     const name = baseName(path);
     const beside = Object.fromEntries(files.filter((file) => file.path !== path).map((file) => [baseName(file.path), file.bytes]));
     this.#main.replaceChildren(el("h3", {}, name), el("p", { role: "status", class: "notice" }, "Fitting the motion to Marathon Man. A long recording takes minutes."));
@@ -84,8 +78,7 @@ class Motion implements View {
       stay();
       this.#show(name, motion, warnings);
     } catch (error) {
-      this.#main.replaceChildren();
-      fail(error);
+      giveUp(error);
     } finally {
       this.#import = null;
     }

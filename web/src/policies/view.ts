@@ -7,10 +7,8 @@ import { optionsOf } from "../app/route";
 import type { Context, View } from "../app/view";
 import { forget, kept } from "../learn/kept";
 import { Player } from "../play/player";
-import { skinOf } from "../views/characters";
+import { POLICIES, skinOf } from "../views/characters";
 
-/** Policies that come with the page and have no view of their own. */
-const SHIPPED = ["hopper", "walker2d", "ant", "MarathonManController", "WalkerController", "AntController", "HopperController"];
 /** Largest policy, bytes. */
 const MOST = 32e6;
 
@@ -24,7 +22,7 @@ async function find({ params, files }: Context): Promise<Loaded> {
   if (given) return { name: baseName(given.path), bytes: given.bytes };
   const address = params.get("policy");
   if (address === null) return { name: "hopper", bytes: await fetchBytes(pageUrl("policies/hopper.safetensors"), MOST) };
-  const url = SHIPPED.includes(address) ? pageUrl(`policies/${address}.safetensors`) : new URL(address, document.baseURI);
+  const url = POLICIES.includes(address) ? pageUrl(`policies/${address}.safetensors`) : new URL(address, document.baseURI);
   if (!/^https?:$/.test(url.protocol)) throw new Error(`${address} is not an address of the web`);
   return { name: baseName(url.pathname), bytes: await fetchBytes(url, MOST) };
 }
@@ -40,18 +38,15 @@ class Policies implements View {
   async show(): Promise<void> {
     const { panel, marathon } = this.#context;
     panel.replaceChildren(el("h2", {}, "Policies"));
-    try {
-      const { name, bytes } = await find(this.#context);
-      this.#context.stay();
-      const info = marathon.policyInfo(bytes);
-      const agent = this.#context.params.get("agent") ?? info.agent;
-      this.#play(agent, bytes);
-      panel.append(el("h3", {}, name), facts(info));
-    } catch (error) {
-      this.#context.stay();
-      // the rest of the view still works
-      this.#context.fail(error);
+    const { name, bytes } = await find(this.#context);
+    this.#context.stay();
+    const info = marathon.policyInfo(bytes);
+    const agent = this.#context.params.get("agent") ?? info.agent;
+    if (!marathon.agents().includes(agent)) {
+      throw new Error(`${name} is for ${agent}, which this page does not have: 'marathon serve' shows it`);
     }
+    this.#play(agent, bytes);
+    panel.append(el("h3", {}, name), facts(info));
     this.#fill();
   }
 
@@ -69,7 +64,7 @@ class Policies implements View {
     const { panel, open, openFiles, fail } = this.#context;
     if (this.#player) panel.append(this.#player.controls);
     const shipped = el("div", { class: "row" });
-    for (const name of SHIPPED) shipped.append(button(name, () => open("policies", { policy: name })));
+    for (const name of POLICIES) shipped.append(button(name, () => open("policies", { policy: name })));
     const list = el("ul", { class: "list" });
     for (const { name, bytes } of kept()) {
       const item = el(
@@ -77,8 +72,12 @@ class Policies implements View {
         {},
         button(name, () => open("policies", {}, [{ path: `${name}.safetensors`, bytes }])),
         button("Remove", () => {
-          forget(name);
-          item.remove();
+          try {
+            forget(name);
+            item.remove();
+          } catch (error) {
+            fail(error);
+          }
         }, { "aria-label": `Remove ${name}` }),
       );
       list.append(item);

@@ -21,12 +21,17 @@ export const CHARACTERS: readonly Character[] = [
   { name: "Course", label: "Course (Walker)", agent: "TerrainWalker2d-v0", policy: "TerrainWalker2d", skin: "Walker", distance: 5.4 },
 ];
 
-/** The character of a name, or Marathon Man. */
+/** The task in which Marathon Man follows clips, and its policy. */
+export const FOLLOWER = { agent: "MarathonMan-v0", policy: "MarathonMan" };
+
+/** Policies that come with the page and can be chosen. */
+export const POLICIES = ["hopper", "walker2d", "ant", ...CHARACTERS.map(({ policy }) => policy)];
+
+/** The character of a name; without one, Marathon Man. */
 export function characterOf(name: string | null): Character {
-  const [first] = CHARACTERS;
-  const found = CHARACTERS.find((character) => character.name === name) ?? first;
-  if (found === undefined) throw new Error("there are no characters");
-  return found;
+  const found = CHARACTERS.find((character) => character.name === (name ?? CHARACTERS[0]?.name));
+  if (found) return found;
+  throw new Error(`agent is '${name}', expected ${CHARACTERS.map((character) => character.name).join(", ")}`);
 }
 
 /** The skin of a task's body, by the names of its bodies. */

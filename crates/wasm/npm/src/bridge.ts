@@ -71,6 +71,17 @@ export class Bridge {
     return place;
   }
 
+  /** Frees an object. It goes with the module if that has stopped. */
+  free(object: number): void {
+    if (this.#stopped !== null) return;
+    try {
+      this.exports.free_object(object);
+    } catch (error) {
+      if (!(error instanceof WebAssembly.RuntimeError)) throw error;
+      this.#stop(error);
+    }
+  }
+
   #send(request: object | undefined, files: Files): void {
     const names = Object.keys(files);
     if (request === undefined && names.length === 0) {
@@ -114,13 +125,19 @@ const registry = new FinalizationRegistry<() => void>((free) => free());
 /** An object of the module. */
 export abstract class Handle {
   protected readonly bridge: Bridge;
-  protected readonly object: number;
+  readonly #object: number;
   #freed = false;
 
   protected constructor(bridge: Bridge, object: number) {
     this.bridge = bridge;
-    this.object = object;
-    registry.register(this, () => bridge.exports.free_object(object), this);
+    this.#object = object;
+    registry.register(this, () => bridge.free(object), this);
+  }
+
+  /** The object's number. The module gives that of a freed object to another one. */
+  protected get object(): number {
+    if (this.#freed) throw new MarathonError("this object has been freed");
+    return this.#object;
   }
 
   /** Frees the memory of the object. Without this call, it is freed some time after the last use. */
@@ -128,7 +145,7 @@ export abstract class Handle {
     if (this.#freed) return;
     this.#freed = true;
     registry.unregister(this);
-    this.bridge.exports.free_object(this.object);
+    this.bridge.free(this.#object);
   }
 }
 

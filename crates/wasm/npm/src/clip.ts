@@ -1,4 +1,5 @@
 import { type Bridge, Handle } from "./bridge.js";
+import { bytes, files as checked, numbers, text } from "./check.js";
 import { ARRAY, MATRIX } from "./exports.js";
 import type { ClipInfo, ModelInfo } from "./types.js";
 
@@ -18,7 +19,9 @@ export class Clip extends Handle {
     recording: Uint8Array,
     files: Readonly<Record<string, Uint8Array>>,
   ): Clip {
-    const object = bridge.call((exports) => exports.clip_new(), { character, name }, { ...files, recording });
+    const request = { character: text("character", character), name: text("name", name) };
+    const all = { ...checked("files", files), recording: bytes("recording", recording) };
+    const object = bridge.call((exports) => exports.clip_new(), request, all);
     return new Clip(bridge, object);
   }
 
@@ -47,6 +50,7 @@ export class Clip extends Handle {
   }
 
   #floats(which: number, time: number, count: number): Float32Array {
+    numbers("time", [time], 1);
     const place = this.bridge.place((exports) => exports.clip_array(this.object, which, time));
     return this.bridge.floats(place, count * MATRIX);
   }

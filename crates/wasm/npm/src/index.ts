@@ -5,6 +5,7 @@
  * @module
  */
 import type { Bridge } from "./bridge.js";
+import { bytes } from "./check.js";
 import { Clip } from "./clip.js";
 import { Env } from "./env.js";
 import { type Lanes, type LoadOptions, instantiate } from "./load.js";
@@ -70,7 +71,7 @@ export class Marathon {
 
   /** Reads the description in a policy file. */
   policyInfo(policy: Uint8Array): PolicyInfo {
-    this.#bridge.call((exports) => exports.policy_info(), {}, { policy });
+    this.#bridge.call((exports) => exports.policy_info(), {}, { policy: bytes("policy", policy) });
     return this.#bridge.json<PolicyInfo>();
   }
 

@@ -1,4 +1,5 @@
 import { type Bridge, Handle, joinState, splitState } from "./bridge.js";
+import { count, files as checked, index, numbers, text } from "./check.js";
 import type { Vector } from "./env.js";
 import { ARRAY, MATRIX } from "./exports.js";
 import type { MeshData, ModelInfo, State } from "./types.js";
@@ -9,7 +10,8 @@ export class Simulation extends Handle {
 
   /** @internal Use `Marathon.simulation`. */
   static create(bridge: Bridge, xml: string, files: Readonly<Record<string, Uint8Array>>, name?: string): Simulation {
-    const object = bridge.call((exports) => exports.simulation_new(), { xml, name: name ?? null }, files);
+    const request = { xml: text("the model", xml), name: name ?? null };
+    const object = bridge.call((exports) => exports.simulation_new(), request, checked("files", files));
     return new Simulation(bridge, object);
   }
 
@@ -30,12 +32,18 @@ export class Simulation extends Handle {
 
   /** Advances by physics steps. Returns false if the state became infinite; the model is then back at its start. */
   step(steps = 1): boolean {
+    count("steps", steps);
+    const ctrl = this.ctrl;
+    numbers("ctrl", ctrl, ctrl.length);
     this.bridge.call((exports) => exports.simulation_step(this.object, steps));
     return this.bridge.bytes().length === 0;
   }
 
   /** Pushes a body until changed: force, N, and torque, N m, in world axes at its center of mass. */
   push(body: number, force: Vector, torque: Vector = [0, 0, 0]): void {
+    index("body", body, this.model.bodies.length);
+    numbers("force", force, 3);
+    numbers("torque", torque, 3);
     this.bridge.call((exports) => exports.simulation_push(this.object, body, ...force, ...torque));
   }
 
@@ -57,20 +65,24 @@ export class Simulation extends Handle {
 
   /** Sets the state. */
   setState(qpos: ArrayLike<number>, qvel: ArrayLike<number>): void {
+    numbers("qpos", qpos, this.model.nq);
+    numbers("qvel", qvel, this.model.nv);
     this.bridge.call((exports) => exports.simulation_set_state(this.object), {}, { state: joinState(qpos, qvel) });
   }
 
   /** Heights of a height field, m, `[row][column]`. */
   ground(field: number): Float32Array {
+    index("field", field, this.model.fields.length);
     this.bridge.call((exports) => exports.simulation_ground(this.object, field));
     return new Float32Array(this.bridge.bytes().buffer);
   }
 
   /** A mesh, to draw it. */
-  mesh(index: number): MeshData {
-    this.bridge.call((exports) => exports.simulation_mesh(this.object, index));
+  mesh(mesh: number): MeshData {
+    index("mesh", mesh, this.model.meshes.length);
+    this.bridge.call((exports) => exports.simulation_mesh(this.object, mesh));
     const { buffer } = this.bridge.bytes();
-    const points = 3 * (this.model.meshes[index]?.vertices ?? 0);
+    const points = 3 * (this.model.meshes[mesh]?.vertices ?? 0);
     return { vertices: new Float32Array(buffer, 0, points), faces: new Uint32Array(buffer, 4 * points) };
   }
 

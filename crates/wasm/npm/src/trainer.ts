@@ -1,4 +1,5 @@
 import { type Bridge, Handle } from "./bridge.js";
+import { text } from "./check.js";
 import { MarathonError } from "./error.js";
 import type { Config, Iteration } from "./types.js";
 
@@ -13,7 +14,7 @@ export class Trainer extends Handle {
     if (!("training_new" in bridge.exports)) {
       throw new MarathonError('this module is for play and has no training; load it with parts: "all"');
     }
-    const object = bridge.call((exports) => exports.training_new(), { agent, config });
+    const object = bridge.call((exports) => exports.training_new(), { agent: text("the task", agent), config });
     return new Trainer(bridge, object);
   }
 

@@ -1,5 +1,6 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
+import { createServer } from "node:http";
 import { test } from "node:test";
 import { MarathonError, load } from "../dist/index.js";
 
@@ -101,7 +102,7 @@ test("height fields have heights in meters", () => {
   const simulation = marathon.simulation(xml);
   // MJCF lists the rows from the largest y on
   assert.deepEqual([...simulation.ground(0)], [0, 0.125, 0.5, 0, 0.125, 0.25]);
-  assert.throws(() => simulation.ground(1), /no height field 1/);
+  assert.throws(() => simulation.ground(1), /field is 1, expected a whole number from 0 to 0/);
 });
 
 test("meshes have their triangles", () => {
@@ -156,10 +157,57 @@ test("errors name the place, and missing files", () => {
   assert.equal(marathon.env("Hopper-v0").spec.id, "Hopper-v0", "the module still works");
 });
 
+test("numbers and bytes are checked before the module sees them", async () => {
+  const env = marathon.env("Hopper-v0", { agents: 2 });
+  const simulation = marathon.simulation(`<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>`);
+  const walker = await policy("WalkerController");
+  const snapshot = env.snapshot();
+  for (const [wrong, message] of [
+    [() => simulation.step(-1), /steps is -1, expected a whole number from 0/],
+    [() => simulation.step(1.5), /steps is 1.5/],
+    [() => simulation.push(2, [0, 0, 1]), /body is 2, expected a whole number from 0 to 1/],
+    [() => simulation.setState([0, 0, NaN, 1, 0, 0, 0], [0, 0, 0, 0, 0, 0]), /qpos\[2\] is NaN/],
+    [() => env.state(-1), /agent is -1, expected a whole number from 0 to 1/],
+    [() => env.step([1, 2, 3]), /actions has 3 numbers, expected 8/],
+    [() => env.step([0, 0, 0, 0, NaN, 0, 0, 0]), /actions\[4\] is NaN, expected a finite number/],
+    [() => env.command(0, { speed: 1 }), /expected none: the task takes no commands/],
+    [() => env.reset(-1), /seed is -1/],
+    [() => marathon.env("Hopper-v0", { agnets: 2 }), /'agnets', expected some of agents, seed,/],
+    [() => marathon.env("Hopper-v0", { agents: 1e9 }), /agents is 1000000000, expected a whole number from 1 to 100000/],
+    [() => marathon.trainer("Hopper-v0", { network: { hidden: [65536, 65536] } }), /network\.hidden is \[65536, 65536\]/],
+    [() => env.restore(snapshot.map((x, i) => (i === 20 ? x ^ 64 : x))), /the snapshot is damaged/],
+    [() => marathon.env("Nothing-v0"), /`agents\(\)`/],
+    [() => marathon.env("Hopper-v0", { policy: "hopper" }), /policy is hopper, expected the bytes of a file/],
+    [() => marathon.policyInfo(walker.slice(9)), /neither those of a \.safetensors file nor/],
+    [() => marathon.env("Hopper-v0", { agents: 3 }).restore(snapshot), /the snapshot has 2 agents of \d+ observations, expected 3/],
+  ]) {
+    assert.throws(wrong, (error) => {
+      assert.ok(error instanceof MarathonError, `${error}`);
+      assert.match(error.message, message);
+      assert.doesNotMatch(error.message, /MARATHON_LIMITS/);
+      return true;
+    });
+  }
+  assert.equal(marathon.policyInfo(walker.buffer).agent, "WalkerController-v0", "an ArrayBuffer will do");
+});
+
+test("a page that has no module says so", async (t) => {
+  const server = createServer((_, response) => response.setHeader("content-type", "text/html").end("<!doctype html>"));
+  await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
+  t.after(() => server.close());
+  await assert.rejects(load({ base: `http://127.0.0.1:${server.address().port}/wasm` }), /wasm\/\w+\.wasm is not a WebAssembly module; copy the \.wasm files/);
+  await assert.rejects(load({ base: "http://[" }), /base is 'http:\/\/\['/);
+});
+
 test("freed objects are refused, and memory does not grow", () => {
   const env = marathon.env("Hopper-v0");
   env.free();
+  // the module gives the number of a freed object to the next one
+  const other = marathon.env("Hopper-v0");
+  const hash = other.hash();
   assert.throws(() => env.step(), /has been freed/);
+  assert.throws(() => env.step([1, 1, 1, 1]), /has been freed/);
+  assert.equal(other.hash(), hash);
   const before = marathon.memoryBytes;
   for (let i = 0; i < 200; i++) marathon.env("Hopper-v0", { agents: 16 }).free();
   assert.ok(marathon.memoryBytes - before < 2e6, `${marathon.memoryBytes - before} bytes`);
