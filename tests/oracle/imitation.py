@@ -2,7 +2,7 @@
 
 Written from docs/reference/environments/marathon-man.md and in-style.md, not from the Rust code. Reads one JSON object from stdin:
 
-    {"cases": [{"figure": "marathon_man", "xml": "...", "frame_skip": 5, "control": "pd", "action_scale": 0.5, "reward": "deepmimic", "distance": 0.5,
+    {"cases": [{"figure": "marathon_man", "xml": "...", "frame_skip": 5, "control": "pd", "action_scale": 0.5, "max_target": 1.0, "reward": "deepmimic", "distance": 0.5,
                 "episodes": [{"qpos": [...], "qvel": [...], "actions": [[...], ...],
                               "clip": [{"qpos": [...], "qvel": [...], "phase": 0.1, "facing": 0.0}, ...]}, ...]}, ...]}
 
@@ -110,7 +110,8 @@ def play(case, model, episode):
             data.ctrl[i] = action[i]
             if case["control"] == "pd":
                 target = clip[t + 1].d.qpos[joint.qposadr[0]] + 0.1 * clip[t + 1].d.qvel[joint.dofadr[0]]
-                data.ctrl[i] = target + case["action_scale"] * action[i]
+                target += case["action_scale"] * action[i]
+                data.ctrl[i] = np.clip(target, -case["max_target"], case["max_target"])
         fallen = False
         for _ in range(case["frame_skip"]):
             mujoco.mj_step(model, data)

@@ -3,12 +3,14 @@
 use std::sync::LazyLock;
 
 use marathon_physics::Model;
+use marathon_physics::lanes::Real;
 use marathon_physics::mjcf::MjcfError;
 use marathon_physics::spec::{Actuator, Kind, ModelSpec};
 
 use super::super::imitation::Anatomy;
 use crate::agent::options::Choice;
-use crate::agent::{ModelSource, Part};
+use crate::agent::senses::clamp;
+use crate::agent::{ModelSource, Part, Scale};
 
 /// The model with motors.
 const MODEL: &str = marathon_assets::text("agents/marathon_man.xml");
@@ -156,6 +158,21 @@ impl Choice for Control {
         &[(Control::Pd, "pd"), (Control::PdRange, "pd_range"), (Control::Torque, "torque"), (Control::Servo, "servo")];
 }
 
+/// Sets the targets of the servos: each action offsets the next pose of its joint by up to `action_scale`. A target is an angle of at
+/// most `max_target`, both rad.
+#[inline(always)]
+pub fn set_targets<T: Real>(
+    ctrl: &mut [T],
+    action: &[T],
+    [action_scale, max_target]: [Scale; 2],
+    poses: [T; JOINTS.len()],
+) {
+    for (i, joint) in ACTIONS.into_iter().enumerate() {
+        let target = action[i].mul_add(T::lit(action_scale.0), poses[joint]);
+        ctrl[i] = clamp(target, -max_target.0, max_target.0);
+    }
+}
+
 /// The model with the actuators for a kind of control.
 pub fn model(control: Control) -> ModelSource {
     // the registry reads the facts of every task at the start, so the edits are made once, when they are needed
@@ -188,6 +205,8 @@ fn with_servos(control: Control) -> Result<ModelSpec, MjcfError> {
             _ => {
                 let [middle, reach] = ranges.as_ref().map_or([0.0, 1.0], |ranges| ranges[i]);
                 let (gain, bias) = (stiffness * reach, stiffness * middle);
+                // its controls are angles, not the fractions of the motors
+                let servo = if control == Control::Pd { servo.set("ctrllimited", false) } else { servo };
                 let law = servo.set("gainprm", gain).set("biasprm", [bias, -stiffness, -(DAMPING_TIME * stiffness)]);
                 law.force_range([-strength, *strength])
             }
@@ -218,6 +237,7 @@ mod tests {
             assert_eq!(names, JOINTS.each_ref().map(|joint| joint.name));
             for (actuator, joint) in model.actuators.iter().zip(ACTIONS) {
                 assert_eq!(actuator.name, JOINTS[joint].name);
+                assert_eq!(actuator.ctrl_limited, control != Control::Pd, "targets are angles");
                 if control == Control::Torque {
                     assert_eq!(actuator.gear[0], JOINTS[joint].strength);
                 } else {

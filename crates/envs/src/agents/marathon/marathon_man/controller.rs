@@ -26,6 +26,7 @@ use marathon_physics::lanes::Real;
 use super::super::imitation::{self, StartAt, sub, turned_to};
 use super::body::{
     ACTIONS, ANATOMY, BUTT, Control, DAMPING_TIME, FEET, FIRST_QPOS, FIRST_QVEL, JOINTS, PARTS, TOUCH, model,
+    set_targets,
 };
 use super::clips::{self, ALL};
 use super::skills::{BACKFLIP, FROM_A_STAND, JUMP, RISEN, SKILLS, SLOTS, Skills, carriage};
@@ -86,6 +87,8 @@ crate::options! {
     pub struct ControllerArguments {
         /// Largest offset of a servo's target by an action, rad.
         action_scale: Scale = Scale(1.0),
+        /// Largest angle of a servo's target, rad. With 1, it cannot bend a hip or a knee by more than about 60 degrees.
+        max_target: Scale = Scale(3.0),
         /// Start of an episode: `random` decisions of the clips and skills, `first` (standing), or `adaptive` (as in
         /// the steered task).
         start: StartAt = StartAt::Random,
@@ -149,9 +152,16 @@ impl Controller {
         let all = clips::is_all(&arguments.clip);
         let named = |name: &str| all || arguments.clip.iter().any(|clip| clip.name() == name);
         let does = Does { gait: CLIPS.into_iter().any(named), skills: SKILLS.map(|skill| named(skill.clip)) };
-        let ControllerArguments { action_scale, start, commands, replay_falls_prob, .. } = arguments;
+        let ControllerArguments { action_scale, max_target, start, commands, replay_falls_prob, .. } = arguments;
         let steer = Steer::of(
-            SteerArguments { action_scale, start, commands, replay_falls_prob, ..SteerArguments::default() },
+            SteerArguments {
+                action_scale,
+                max_target,
+                start,
+                commands,
+                replay_falls_prob,
+                ..SteerArguments::default()
+            },
             MEMORY,
         );
         Controller { arguments, does, steer }
@@ -255,7 +265,6 @@ impl Agent for Controller {
 
     #[inline(always)]
     fn ctrl<T: Real>(&self, c: &mut Ctrl<T>) {
-        let action_scale = T::lit(self.arguments.action_scale.0);
         let (on, clip) = (SKILL.on(c.memory), c.reference(1));
         let gait = Steer::next_pose(|slot| c.memory[slot], PACE_LIMITS, c.dt, DAMPING_TIME);
         let mut targets = [T::zero(); JOINTS.len()];
@@ -263,9 +272,8 @@ impl Agent for Controller {
             let of_clip = clip.qvel(FIRST_QVEL + joint).mul_add(T::lit(DAMPING_TIME), clip.qpos(FIRST_QPOS + joint));
             *target = T::select(on, of_clip, gait(joint));
         }
-        for (i, joint) in ACTIONS.into_iter().enumerate() {
-            c.ctrl[i] = c.action[i].mul_add(action_scale, targets[joint]);
-        }
+        let ControllerArguments { action_scale, max_target, .. } = self.arguments;
+        set_targets(c.ctrl, c.action, [action_scale, max_target], targets);
     }
 
     #[inline(always)]

@@ -47,7 +47,9 @@ use crate::any_agent::AnyAgent;
 pub use super::imitation::StartAt;
 use super::imitation::{self, sub, turned_to};
 pub use body::Control;
-use body::{ACTIONS, ANATOMY, BUTT, DAMPING_TIME, FIRST_QPOS, FIRST_QVEL, JOINTS, PARTS, TOUCH, TRUNK, model};
+use body::{
+    ACTIONS, ANATOMY, BUTT, DAMPING_TIME, FIRST_QPOS, FIRST_QVEL, JOINTS, PARTS, TOUCH, TRUNK, model, set_targets,
+};
 pub use courses::TerrainMarathonMan;
 pub use reward::Reward;
 
@@ -85,6 +87,8 @@ crate::options! {
         sharpness: Scale = Scale(1.0),
         /// Largest offset of a servo's target by an action of `pd`, rad.
         action_scale: Scale = Scale(1.0),
+        /// Largest angle of a servo's target by `pd`, rad. With 1, it cannot bend a hip or a knee by more than about 60 degrees.
+        max_target: Scale = Scale(3.0),
         /// Number of later clip frames in the observation, 0 to 3: 4, 8 and 16 decisions ahead.
         future: usize = 0,
         /// Longest episode, s. With several clips, shorter episodes give mastered clips a smaller part of the training.
@@ -217,14 +221,13 @@ impl Agent for MarathonMan {
         match self.arguments.control {
             Control::PdRange | Control::Torque | Control::Servo => c.ctrl.copy_from_slice(c.action),
             Control::Pd => {
-                let action_scale = T::lit(self.arguments.action_scale.0);
-                for (i, joint) in ACTIONS.into_iter().enumerate() {
-                    let clip = c.reference(1);
-                    // compensate the servo's damping, which would slow the clip's motion
-                    let target =
-                        clip.qvel(FIRST_QVEL + joint).mul_add(T::lit(DAMPING_TIME), clip.qpos(FIRST_QPOS + joint));
-                    c.ctrl[i] = c.action[i].mul_add(action_scale, target);
-                }
+                let Arguments { action_scale, max_target, .. } = self.arguments;
+                let clip = c.reference(1);
+                // compensate the servo's damping, which would slow the clip's motion
+                let poses = std::array::from_fn(|joint| {
+                    clip.qvel(FIRST_QVEL + joint).mul_add(T::lit(DAMPING_TIME), clip.qpos(FIRST_QPOS + joint))
+                });
+                set_targets(c.ctrl, c.action, [action_scale, max_target], poses);
             }
         }
     }

@@ -48,6 +48,7 @@ use super::super::heading;
 use super::super::imitation::{EARLY, StartAt, observe_body, sub, turned_to};
 use super::body::{
     ACTIONS, ANATOMY, BUTT, Control, DAMPING_TIME, END_EFFECTORS, FEET, FIRST_QPOS, JOINTS, PARTS, TOUCH, model, parts,
+    set_targets,
 };
 use super::clips::{self, STAND};
 use super::gait::{beginning, gaits};
@@ -201,6 +202,8 @@ crate::options! {
         control: Control = Control::Pd,
         /// Largest offset of a servo's target by an action of `pd`, rad.
         action_scale: Scale = Scale(1.0),
+        /// Largest angle of a servo's target by `pd`, rad. With 1, it cannot bend a hip or a knee by more than about 60 degrees.
+        max_target: Scale = Scale(3.0),
         /// Start of an episode: `random` decisions of the clips, `first` (standing), or `adaptive`. With `adaptive`,
         /// half of the episodes after an early failure start where the failed one did. Half of the others start in a
         /// clip that fits the command.
@@ -348,12 +351,10 @@ impl Agent for Steer {
         match self.arguments.control {
             Control::PdRange | Control::Torque | Control::Servo => c.ctrl.copy_from_slice(c.action),
             Control::Pd => {
-                let action_scale = T::lit(self.arguments.action_scale.0);
+                let SteerArguments { action_scale, max_target, .. } = self.arguments;
                 // compensate the servo's damping, which would slow the gait
                 let next = Self::next_pose(|slot| c.memory[slot], PACE_LIMITS, c.dt, DAMPING_TIME);
-                for (i, joint) in ACTIONS.into_iter().enumerate() {
-                    c.ctrl[i] = c.action[i].mul_add(action_scale, next(joint));
-                }
+                set_targets(c.ctrl, c.action, [action_scale, max_target], std::array::from_fn(next));
             }
         }
     }

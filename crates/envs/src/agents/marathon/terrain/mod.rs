@@ -109,10 +109,16 @@ pub type TerrainWalker2d = Terrain<Walker2dV0>;
 pub type TerrainAnt = Terrain<AntV0>;
 
 /// A figure that runs over uneven ground.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Terrain<F> {
     figure: F,
     arguments: TerrainArguments,
+}
+
+impl<F: Runner> Default for Terrain<F> {
+    fn default() -> Self {
+        Terrain { figure: F::on_courses(), arguments: TerrainArguments::default() }
+    }
 }
 
 impl<F: Runner> Terrain<F> {
