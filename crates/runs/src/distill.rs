@@ -23,6 +23,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+/// Options of a task that say what an action means.
+const OF_ACTIONS: [&str; 3] = ["control", "action_scale", "max_target"];
 /// Decisions of each agent between two rounds of learning.
 const HORIZON: usize = 32;
 /// First rounds, in which the teachers play alone and the student does not learn. They provide the normalization
@@ -256,6 +258,7 @@ impl School {
         if teachers.is_empty() {
             return Err(RunError::option("teacher", "is not given, expected at least one policy"));
         }
+        let task = acting_alike(task, &teachers)?;
         let mut lessons_of = Vec::new();
         for (_, teacher) in &teachers {
             lessons_of.push(clips_of(&task, teacher)?);
@@ -353,6 +356,27 @@ impl Class {
         }
         Ok(counts)
     }
+}
+
+/// The task with the meaning of an action that it has for the teachers, unless the caller has set it. What a teacher does is right with
+/// that meaning only.
+fn acting_alike(mut task: TaskConfig, teachers: &[(&PathBuf, Policy)]) -> Result<TaskConfig, RunError> {
+    let agent = registry::agent(&task.agent)?;
+    for name in OF_ACTIONS.into_iter().filter(|name| agent.has_option(name)) {
+        let known = teachers.iter().filter_map(|(path, teacher)| Some((path, teacher.meta().options.get(name)?)));
+        let mut known = known.filter(|_| task.options.get(name).is_none());
+        let Some((path, value)) = known.next() else { continue };
+        if let Some((other, found)) = known.find(|(_, found)| *found != value) {
+            let (path, other) = (path.display(), other.display());
+            let problem = format!(
+                "{path} has {name}={value} and {other} {name}={found}, expected teachers whose actions mean the same"
+            );
+            return Err(RunError::option("teacher", problem));
+        }
+        let value = value.clone();
+        task.options.set(name, value);
+    }
+    Ok(task)
 }
 
 /// The clips that a teacher follows, if the student's task takes clips.

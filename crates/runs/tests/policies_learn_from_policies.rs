@@ -32,10 +32,23 @@ fn one_policy_walks_and_runs() {
     let (first, last) = (rounds[8].loss, rounds[rounds.len() - 1].loss);
     assert!(last < 0.25 * first, "the loss has fallen from {first} to {last} only");
     assert_eq!(policy.meta().options.get("clip"), Some(&Value::Text("walk,run".into())));
+    assert_eq!(policy.meta().options.get("max_target"), Some(&Value::Number(1.0)), "that of the teachers");
     // 5 s from the first frame; an untrained character falls within half a second
     let done = imitation::from_beginning(&policy, &EvalOptions { episodes: 16, ..Default::default() }).unwrap();
     let seconds: Vec<f64> = done.iter().map(|clip| clip.seconds).collect();
     assert!(seconds.len() == 2 && seconds.iter().all(|s| *s > 10.0), "he goes on for {seconds:?} s");
+}
+
+/// The actions of teachers must mean the same.
+#[test]
+fn teachers_with_other_servos_are_refused() {
+    let teachers = [shipped("MarathonManWalk"), shipped("MarathonManBackflip")];
+    let wrong = distill(man(&[]), &teachers, &DistillOptions::default(), &mut |_| Control::Stop).err();
+    let text = wrong.expect("an error").to_string();
+    assert!(text.contains("max_target=1") && text.contains("MarathonManBackflip.safetensors max_target=3"), "{text}");
+    let options = DistillOptions { hidden: vec![8], steps: 1, agents: 16, ..Default::default() };
+    let forced = distill(man(&[("max_target", "3")]), &teachers, &options, &mut |_| Control::Continue).unwrap();
+    assert_eq!(forced.meta().options.get("max_target"), Some(&Value::Number(3.0)));
 }
 
 /// The same seed gives the same policy for any number of threads; another seed gives another one.
