@@ -358,8 +358,8 @@ impl Class {
     }
 }
 
-/// The task with the meaning of an action that it has for the teachers, unless the caller has set it. What a teacher does is right with
-/// that meaning only.
+/// The task with the meaning of an action that it has for the teachers, unless the caller has set it. A teacher's actions are right
+/// with that meaning only.
 fn acting_alike(mut task: TaskConfig, teachers: &[(&PathBuf, Policy)]) -> Result<TaskConfig, RunError> {
     let agent = registry::agent(&task.agent)?;
     for name in OF_ACTIONS.into_iter().filter(|name| agent.has_option(name)) {
