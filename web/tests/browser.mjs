@@ -32,6 +32,14 @@ export async function open(context, url, view) {
   return { page, errors };
 }
 
+/** Opens a view in a context of its own. `prepare` gets the context before the page is there. */
+export async function visitWith(browser, url, view, options = DESKTOP, prepare = async () => {}) {
+  const context = await browser.newContext(options);
+  await prepare(context);
+  const { page, errors } = await open(context, url, view);
+  return { page, errors, close: () => context.close() };
+}
+
 export function ready(page, view) {
   return page.waitForFunction((name) => document.documentElement.dataset.ready === name, view, { timeout: 30_000 });
 }

@@ -1,7 +1,7 @@
 // Mistakes of a user, a link or a host leave the page as it was, with a message, and nothing is lost by going elsewhere.
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { DESKTOP, PHONE, hasChromium, launch, open, ready } from "./browser.mjs";
+import { DESKTOP, PHONE, hasChromium, launch, ready, visitWith } from "./browser.mjs";
 import { drop } from "./drop.mjs";
 import { serve } from "./server.mjs";
 
@@ -18,12 +18,7 @@ after(async () => {
   await server.close();
 });
 
-async function visit(path, view, options = DESKTOP, prepare = async () => {}) {
-  const context = await browser.newContext(options);
-  await prepare(context);
-  const { page, errors } = await open(context, server.url + path, view);
-  return { page, errors, close: () => context.close() };
-}
+const visit = (path, view, options, prepare) => visitWith(browser, server.url + path, view, options, prepare);
 
 const message = (page) => page.locator(".message[data-kind=error]");
 const ball = (size) => `<mujoco><worldbody><body pos="0 0 1"><freejoint/><geom size="${size}"/></body></worldbody></mujoco>`;

@@ -4,7 +4,7 @@ import { readFile } from "node:fs/promises";
 import { after, before, test } from "node:test";
 import { brotliCompressSync, constants } from "node:zlib";
 import { load } from "marathon-rl";
-import { DESKTOP, LANES, PHONE, hasChromium, launch, open, ready } from "./browser.mjs";
+import { DESKTOP, LANES, PHONE, hasChromium, launch, open, ready, visitWith } from "./browser.mjs";
 import { bvh, drop } from "./drop.mjs";
 import { FOLDER, serve } from "./server.mjs";
 
@@ -32,12 +32,7 @@ after(async () => {
   await server.close();
 });
 
-async function visit(path, view, options = DESKTOP, prepare = async () => {}) {
-  const context = await browser.newContext(options);
-  await prepare(context);
-  const { page, errors } = await open(context, server.url + path, view);
-  return { page, errors, close: () => context.close() };
-}
+const visit = (path, view, options, prepare) => visitWith(browser, server.url + path, view, options, prepare);
 
 const center = (page) => page.evaluate(() => window.marathonPage.view.player.arena.puppet.center.toArray());
 

@@ -57,7 +57,7 @@ export async function fetchBytes(url: URL, limit = 64e6): Promise<Uint8Array> {
 /** Reads an answer, and stops at the limit: not every server tells the size before. */
 async function readAtMost(response: Response, limit: number): Promise<Uint8Array> {
   const reader = response.body?.getReader();
-  const parts: Uint8Array[] = [];
+  const parts: Uint8Array<ArrayBuffer>[] = [];
   let length = 0;
   while (reader) {
     const { done, value } = await reader.read();
@@ -69,13 +69,7 @@ async function readAtMost(response: Response, limit: number): Promise<Uint8Array
     }
     parts.push(value);
   }
-  const bytes = new Uint8Array(length);
-  let at = 0;
-  for (const part of parts) {
-    bytes.set(part, at);
-    at += part.length;
-  }
-  return bytes;
+  return new Uint8Array(await new Blob(parts).arrayBuffer());
 }
 
 export function tooLarge(name: string, limit: number): Error {

@@ -7,8 +7,8 @@ import { type Context, type View, shown } from "../app/view";
 import { Keyboard } from "../input/keyboard";
 import { NO_HANDS, PointerControl } from "../input/pointer";
 import { Player } from "../play/player";
-import { ClipPlayer } from "./clip";
 import { FOLLOWER } from "../views/characters";
+import { ClipPlayer } from "./clip";
 import { type Import, startImport } from "./import";
 import { CLIPS } from "./samples";
 

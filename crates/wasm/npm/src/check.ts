@@ -1,26 +1,29 @@
 /** Checks of what JavaScript passes: the module takes whole numbers of 32 bits, and would read others as something else. */
 import { MarathonError } from "./error.js";
 
-/** A whole number of at least `least`. */
-export function count(what: string, value: number, least = 0, most = 2 ** 31 - 1): number {
-  if (Number.isInteger(value) && value >= least && value <= most) return value;
+/** A whole number from `least` to `most`. */
+export function count(what: string, value: number, least = 0, most = 2 ** 31 - 1): void {
+  if (Number.isInteger(value) && value >= least && value <= most) return;
   throw new MarathonError(`${what} is ${String(value)}, expected a whole number from ${least} to ${most}`);
 }
 
 /** An index below `length`. */
-export function index(what: string, value: number, length: number): number {
-  if (Number.isInteger(value) && value >= 0 && value < length) return value;
-  const expected = length === 0 ? "none: there is none" : `a whole number from 0 to ${length - 1}`;
-  throw new MarathonError(`${what} is ${String(value)}, expected ${expected}`);
+export function index(what: string, value: number, length: number): void {
+  if (length === 0) throw new MarathonError(`${what} is ${String(value)}, expected none: there is none`);
+  count(what, value, 0, length - 1);
+}
+
+/** A finite number. */
+export function finite(what: string, value: number | undefined): void {
+  if (!Number.isFinite(value)) throw new MarathonError(`${what} is ${String(value)}, expected a finite number`);
 }
 
 /** Numbers of a length, all of them finite. */
 export function numbers(what: string, values: ArrayLike<number>, length: number): void {
   if (typeof values?.length !== "number") throw new MarathonError(`${what} is ${String(values)}, expected ${length} numbers`);
   if (values.length !== length) throw new MarathonError(`${what} has ${values.length} numbers, expected ${length}`);
-  for (let i = 0; i < length; i++) {
-    if (!Number.isFinite(values[i])) throw new MarathonError(`${what}[${i}] is ${String(values[i])}, expected a finite number`);
-  }
+  // the name is made for a message only: a step checks thousands of numbers
+  for (let i = 0; i < length; i++) if (!Number.isFinite(values[i])) finite(`${what}[${i}]`, values[i]);
 }
 
 /** The bytes of a file. */

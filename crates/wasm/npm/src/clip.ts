@@ -1,5 +1,5 @@
 import { type Bridge, Handle } from "./bridge.js";
-import { bytes, files as checked, numbers, text } from "./check.js";
+import { bytes, files as checked, finite, text } from "./check.js";
 import { ARRAY, MATRIX } from "./exports.js";
 import type { ClipInfo, ModelInfo } from "./types.js";
 
@@ -50,7 +50,7 @@ export class Clip extends Handle {
   }
 
   #floats(which: number, time: number, count: number): Float32Array {
-    numbers("time", [time], 1);
+    finite("time", time);
     const place = this.bridge.place((exports) => exports.clip_array(this.object, which, time));
     return this.bridge.floats(place, count * MATRIX);
   }

@@ -1,5 +1,5 @@
 import { type Bridge, Handle, joinState, splitState } from "./bridge.js";
-import { bytes, count, index, known, numbers, text } from "./check.js";
+import { bytes, count, finite, index, known, numbers, text } from "./check.js";
 import { ARRAY, MATRIX } from "./exports.js";
 import type { EnvOptions, ModelInfo, Spec, State, Step } from "./types.js";
 
@@ -89,7 +89,7 @@ export class Env extends Handle {
    */
   command(agent: number, values: Readonly<Record<string, number>> | null): void {
     this.#check(agent);
-    for (const [name, value] of Object.entries(values ?? {})) numbers(name, [value], 1);
+    for (const [name, value] of Object.entries(values ?? {})) finite(name, value);
     this.bridge.call((exports) => exports.env_command(this.object, agent), { values });
   }
 
