@@ -86,6 +86,14 @@ pub enum Study {
         #[arg(long, value_name = "N", default_value_t = FRESH)]
         fresh: usize,
     },
+    /// Policies on stairs, gaps and boxes of growing size, at each of several commanded speeds.
+    Obstacles {
+        #[command(flatten)]
+        options: Options,
+        /// Policy files of tasks on courses.
+        #[arg(value_name = "POLICY", required = true)]
+        policies: Vec<PathBuf>,
+    },
     /// Characters that learned on ground of ten kinds, with and without seeing it, on courses that are new to all of them.
     /// Runs are kept in runs/assault-course or --keep, each with a small file of its results; these files are enough to
     /// write the page again.
@@ -120,7 +128,7 @@ impl Study {
         match self {
             Study::Table1 { options, .. } | Study::Table3 { options, .. } => options,
             Study::StyleTransfer { options, .. } | Study::AssaultCourse { options, .. } => options,
-            Study::FreshCourses { options, .. } => options,
+            Study::FreshCourses { options, .. } | Study::Obstacles { options, .. } => options,
             Study::Table2(options) | Study::MlagentsAgreement(options) | Study::Concurrency(options) => options,
             Study::DecisionPeriod(options) | Study::Headless(options) | Study::MultiEnv(options) => options,
         }

@@ -14,7 +14,7 @@ use marathon_physics::lanes::Isa;
 use marathon_runs::report::chart::Chart;
 use marathon_runs::{PolicySource, TaskConfig, TaskOptions};
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Seed of the courses, and of the first rollout. No training has it.
 const SEED: u64 = 1_000_033;
@@ -25,7 +25,7 @@ const WORST: f64 = 0.1;
 /// Courses that are run at the same time.
 const AT_ONCE: usize = 256;
 /// Distance at which a course has been run to its end, m.
-const THROUGH: f32 = 104.0;
+const THROUGH: f64 = 104.0;
 
 /// Results on fresh courses.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -56,10 +56,7 @@ pub struct Outcome {
 pub fn run(options: &Options, policies: &[PathBuf], courses: usize) -> Result<Record, StudyError> {
     let (mut rows, mut bars, mut words) = (Vec::new(), Vec::new(), String::new());
     for path in policies {
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let source = PolicySource { policy: path.clone(), agent: None, task: TaskOptions::default() };
-        let policy = source.load()?.0;
-        let task = TaskConfig { agent: policy.meta().agent.clone(), options: policy.meta().options.clone() };
+        let (name, policy, task) = load(path)?;
         let Fresh { all, worst, .. } = measure(&policy, &task, courses, options.threads)?;
         let cells = [all, worst].map(|o| [format!("{:.1}", o.distance), format!("{:.1}", 100.0 * o.finished)]);
         rows.push([vec![name.clone(), courses.to_string()], cells.concat()].concat());
@@ -81,6 +78,18 @@ pub fn run(options: &Options, policies: &[PathBuf], courses: usize) -> Result<Re
         versions: Vec::new(),
         chart: Chart::Bars("mean way on the worst tenth of the courses, m", bars),
     })
+}
+
+/// A policy of a file with its name and its task.
+///
+/// # Errors
+/// If the file cannot be read as a policy.
+pub fn load(path: &Path) -> Result<(String, Policy, TaskConfig), StudyError> {
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let source = PolicySource { policy: path.to_path_buf(), agent: None, task: TaskOptions::default() };
+    let policy = source.load()?.0;
+    let task = TaskConfig { agent: policy.meta().agent.clone(), options: policy.meta().options.clone() };
+    Ok((name, policy, task))
 }
 
 /// Runs a policy on fresh mixed courses of difficulty 1. `task` has its other options.
@@ -123,7 +132,8 @@ impl<'a> Batch<'a> {
     fn run(mut self) -> Result<Vec<[Outcome; 2]>, StudyError> {
         let mut all = vec![[Outcome::default(); 2]; self.grounds.len()];
         for rollout in 0..2 * ROLLOUTS {
-            let results = self.rollout(self.seed + (1 + rollout) * 1_000_003)?;
+            let Batch { env, policy, grounds, seed } = &mut self;
+            let results = self::rollout(env, policy, grounds, None, *seed + (1 + rollout) * 1_000_003)?;
             for (course, Outcome { distance, finished }) in all.iter_mut().zip(results) {
                 let sum = &mut course[(rollout / ROLLOUTS) as usize];
                 sum.distance += distance / ROLLOUTS as f64;
@@ -132,39 +142,50 @@ impl<'a> Batch<'a> {
         }
         Ok(all)
     }
+}
 
-    /// Runs each course once, with the starts of a seed.
-    fn rollout(&mut self, seed: u64) -> Result<Vec<Outcome>, StudyError> {
-        let Batch { env, policy, grounds, .. } = self;
-        let (agents, info, limit) = (env.agents(), env.spec().info.len(), env.spec().max_episode_steps);
-        let way = env.spec().info.iter().position(|name| name == "distance").unwrap_or_default();
-        let mut out = env.buffers();
-        env.reset(Some(seed), &mut out.obs)?;
-        for (i, ground) in grounds.iter().enumerate() {
-            env.set_ground(i, 0, ground)?;
+/// Runs each agent once over its ground, with the starts of a seed, under a command or those that the task draws.
+///
+/// # Errors
+/// If a ground or the command is not for this task.
+pub fn rollout(
+    env: &mut VecEnv,
+    policy: &mut BlockPolicy<&Policy>,
+    grounds: &[Vec<f32>],
+    command: Option<&[f64]>,
+    seed: u64,
+) -> Result<Vec<Outcome>, StudyError> {
+    let (agents, info, limit) = (env.agents(), env.spec().info.len(), env.spec().max_episode_steps);
+    let way = env.spec().info.iter().position(|name| name == "distance").unwrap_or_default();
+    let mut out = env.buffers();
+    env.reset(Some(seed), &mut out.obs)?;
+    for (i, ground) in grounds.iter().enumerate() {
+        env.set_ground(i, 0, ground)?;
+        if command.is_some() {
+            env.set_command(i, command)?;
         }
-        env.observe(&vec![true; agents], &mut out.obs)?;
-        let mut action = vec![0.0; agents * env.spec().act];
-        let mut results: Vec<Option<Outcome>> = vec![None; agents];
-        for decision in 1..=limit {
-            policy.act_rows(&out.obs, None, &mut action);
-            env.step(&action, &mut out)?;
-            for (i, result) in results.iter_mut().enumerate().filter(|(_, result)| result.is_none()) {
-                let over = out.terminated[i] || out.truncated[i] || out.diverged[i];
-                if over || decision == limit {
-                    let distance = out.info[info * i + way];
-                    let stays = !(out.terminated[i] || out.diverged[i]);
-                    let finished = stays && (decision == limit || distance > THROUGH);
-                    let finished = f64::from(u8::from(finished));
-                    *result = Some(Outcome { distance: f64::from(distance), finished });
-                }
-            }
-            if results.iter().all(Option::is_some) {
-                break;
-            }
-        }
-        Ok(results.into_iter().flatten().collect())
     }
+    env.observe(&vec![true; agents], &mut out.obs)?;
+    let mut action = vec![0.0; agents * env.spec().act];
+    let mut results: Vec<Option<Outcome>> = vec![None; agents];
+    for decision in 1..=limit {
+        policy.act_rows(&out.obs, None, &mut action);
+        env.step(&action, &mut out)?;
+        for (i, result) in results.iter_mut().enumerate().filter(|(_, result)| result.is_none()) {
+            let over = out.terminated[i] || out.truncated[i] || out.diverged[i];
+            if over || decision == limit {
+                let distance = f64::from(out.info[info * i + way]);
+                let fell = out.terminated[i] || out.diverged[i];
+                let finished = !fell && (decision == limit || distance > THROUGH);
+                let as_share = |is| f64::from(u8::from(is));
+                *result = Some(Outcome { distance, finished: as_share(finished) });
+            }
+        }
+        if results.iter().all(Option::is_some) {
+            break;
+        }
+    }
+    Ok(results.into_iter().flatten().collect())
 }
 
 /// Means of all courses, and of those with the shortest distances in the first set, both in the second set.

@@ -11,6 +11,7 @@ mod fresh_courses;
 mod headless;
 mod kept;
 mod multi_env;
+mod obstacles;
 mod peers;
 mod record;
 mod reproduce;
@@ -66,6 +67,7 @@ fn run(args: &Args) -> Result<(), StudyError> {
         Study::Headless(_) => headless::run(options),
         Study::MultiEnv(_) => multi_env::run(options),
         Study::StyleTransfer { clips, kept_only, .. } => style_transfer::run(options, clips, *kept_only),
+        Study::Obstacles { policies, .. } => obstacles::run(options, policies),
         Study::FreshCourses { policies, fresh, .. } => fresh_courses::run(options, policies, (*fresh).max(1)),
         Study::AssaultCourse { tasks, grounds, sights, kept_only, no_adversary, fresh, .. } => {
             let evaluations =
