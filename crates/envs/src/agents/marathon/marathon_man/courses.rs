@@ -5,8 +5,8 @@ use marathon_physics::lanes::Real;
 
 use super::super::terrain::{Runner, Terrain};
 use super::body::{ACTIONS, BUTT, FEET, JOINTS};
-use super::steer::{DIRECTION, HOLDS, MAX_SPEED, OBSERVED, START_ROW, Steer, SteerArguments, TERMS};
-use crate::agent::{Agent, Obs, Part, Scale, Senses, Start, Terms};
+use super::steer::{DIRECTION, HOLDS, MAX_SPEED, OBSERVED, START_ROW, Steer, TERMS};
+use crate::agent::{Agent, Obs, Part, Senses, Start, Terms};
 use crate::episode_rng::EpisodeRng;
 
 /// Lowest commanded speed, m/s.
@@ -35,11 +35,6 @@ impl Runner for Steer {
     #[inline(always)]
     fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
         Steer::observe_along(s, out);
-    }
-
-    // the policy that ships was trained with servos that bend a joint by 1 rad at most
-    fn on_courses() -> Self {
-        Steer::of(SteerArguments { max_target: Scale(1.0), ..SteerArguments::default() }, START_ROW + 1)
     }
 
     // start from the clips as in the steered task, but at the beginning of the course, facing along it

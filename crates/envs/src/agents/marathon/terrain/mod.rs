@@ -117,7 +117,7 @@ pub struct Terrain<F> {
 
 impl<F: Runner> Default for Terrain<F> {
     fn default() -> Self {
-        Terrain { figure: F::on_courses(), arguments: TerrainArguments::default() }
+        Terrain { figure: F::default(), arguments: TerrainArguments::default() }
     }
 }
 

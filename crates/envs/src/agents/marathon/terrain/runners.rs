@@ -47,11 +47,6 @@ pub trait Runner: Agent + Clone + Default {
     /// Writes the observation of the body.
     fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>);
 
-    /// The figure with the options that it has on courses.
-    fn on_courses() -> Self {
-        Self::default()
-    }
-
     /// Sets the start state.
     fn place(&self, start: &mut Start) {
         start.add_noise(ResetNoise::MARATHON);
