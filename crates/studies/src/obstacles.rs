@@ -42,20 +42,23 @@ const OBSTACLES: [(Kind, &str, &[f64]); 3] = [
 impl Kind {
     /// Heights along a course whose obstacles begin `shift` m later than usual.
     fn course(self, size: f64, shift: f64) -> Vec<f32> {
-        let mut points = Vec::with_capacity(POINTS);
-        let mut level = |length: f64, height: f64| points.extend(vec![height as f32; (length / CELL).round() as usize]);
-        level(LEVEL_TO + shift - FROM, 0.0);
-        for _ in 0..POINTS {
-            match self {
-                Kind::Stairs => {
-                    (1..=8).for_each(|stair| level(0.3, size * f64::from(stair)));
-                    level(2.0, 8.0 * size);
-                    (0..8).rev().for_each(|stair| level(0.3, size * f64::from(stair)));
-                    level(2.0, 0.0);
-                }
-                Kind::Gaps => [(size, -0.6), (3.0, 0.0)].into_iter().for_each(|(length, height)| level(length, height)),
-                Kind::Boxes => [(1.0, size), (3.0, 0.0)].into_iter().for_each(|(length, height)| level(length, height)),
+        // length and height of each piece of level ground in the order of the course
+        let pieces = match self {
+            Kind::Stairs => {
+                let flights = (1..=8).chain((0..8).rev());
+                let landing = |stair| if stair % 8 == 0 { 2.0 } else { 0.3 };
+                flights.map(|stair| (landing(stair), size * f64::from(stair))).collect()
             }
+            Kind::Gaps => vec![(size, -0.6), (3.0, 0.0)],
+            Kind::Boxes => vec![(1.0, size), (3.0, 0.0)],
+        };
+        let level = |(length, height): (f64, f64)| vec![height as f32; (length / CELL).round() as usize];
+        let mut points = level((LEVEL_TO + shift - FROM, 0.0));
+        for piece in pieces.iter().cycle() {
+            if points.len() >= POINTS {
+                break;
+            }
+            points.extend(level(*piece));
         }
         points.truncate(POINTS);
         points
