@@ -131,11 +131,11 @@ impl<'a> Batch<'a> {
     /// Results of each course: in the first set of rollouts and in the second.
     fn run(mut self) -> Result<Vec<[Outcome; 2]>, StudyError> {
         let mut all = vec![[Outcome::default(); 2]; self.grounds.len()];
-        for rollout in 0..2 * ROLLOUTS {
-            let Batch { env, policy, grounds, seed } = &mut self;
-            let results = self::rollout(env, policy, grounds, None, *seed + (1 + rollout) * 1_000_003)?;
+        let Batch { env, policy, grounds, seed } = &mut self;
+        for i in 0..2 * ROLLOUTS {
+            let results = rollout(env, policy, grounds, None, *seed + (1 + i) * 1_000_003)?;
             for (course, Outcome { distance, finished }) in all.iter_mut().zip(results) {
-                let sum = &mut course[(rollout / ROLLOUTS) as usize];
+                let sum = &mut course[(i / ROLLOUTS) as usize];
                 sum.distance += distance / ROLLOUTS as f64;
                 sum.finished += finished / ROLLOUTS as f64;
             }
@@ -177,8 +177,7 @@ pub fn rollout(
                 let distance = f64::from(out.info[info * i + way]);
                 let fell = out.terminated[i] || out.diverged[i];
                 let finished = !fell && (decision == limit || distance > THROUGH);
-                let as_share = |is| f64::from(u8::from(is));
-                *result = Some(Outcome { distance, finished: as_share(finished) });
+                *result = Some(Outcome { distance, finished: f64::from(u8::from(finished)) });
             }
         }
         if results.iter().all(Option::is_some) {

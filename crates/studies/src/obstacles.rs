@@ -4,6 +4,7 @@ use crate::args::Options;
 use crate::error::StudyError;
 use crate::fresh_courses::{Outcome, load, rollout};
 use crate::record::Record;
+use crate::statistics::spread;
 use marathon_envs::agents::marathon::terrain::course::{CELL, FROM, LEVEL_TO, POINTS};
 use marathon_envs::options::Value;
 use marathon_envs::{Autoreset, VecEnv, VecEnvOptions};
@@ -78,8 +79,8 @@ pub fn run(options: &Options, policies: &[PathBuf]) -> Result<Record, StudyError
                 let obstacle = format!("{} {size} m {unit}", format!("{kind:?}").to_lowercase());
                 for speed in SPEEDS {
                     let (commanded, of) = measure(&policy, &task, kind, *size, speed, options.threads)?;
-                    let mean = |value: fn(&Outcome) -> f64| of.iter().map(value).sum::<f64>() / of.len() as f64;
-                    let (way, passed) = (mean(|o| o.distance), 100.0 * mean(|o| o.finished));
+                    let (way, _) = spread(of.iter().map(|o| o.distance));
+                    let (passed, _) = spread(of.iter().map(|o| 100.0 * o.finished));
                     let speed = if commanded { format!("{speed}") } else { "its own".into() };
                     rows.push(vec![
                         name.clone(),
@@ -114,7 +115,8 @@ pub fn run(options: &Options, policies: &[PathBuf]) -> Result<Record, StudyError
     })
 }
 
-/// Runs a policy over obstacles. Also tells whether the speed was commanded.
+/// Runs a policy over obstacles. Also tells whether the speed was commanded. The environment is new, since the starts after a reset
+/// depend on earlier commands.
 fn measure(
     policy: &Policy,
     task: &TaskConfig,
