@@ -39,13 +39,13 @@ for part in "${parts[@]}"; do
       ;;
     web) web/test.sh --long ;;
     soak)
-      MARATHON_TEST_LONG=yes cargo test --release -p marathon-physics --test ten_million_steps_stay_finite \
-        --test meshes_agree_with_mujoco -- --nocapture
+      MARATHON_TEST_LONG=yes cargo test --release -p marathon-physics --test contracts -- --nocapture \
+        ten_million_steps_stay_finite:: meshes_agree_with_mujoco::
       ;;
     crates) release/publish.sh --dry-run ;;
     player)
-      cargo test --release --workspace --test a_stranger_plays -- --ignored --nocapture
-      MARATHON_TEST_LONG=yes cargo test --release --workspace --test the_camera_stays_outside -- --nocapture
+      cargo test --release --workspace --test contracts -- --ignored --nocapture a_stranger_plays::
+      MARATHON_TEST_LONG=yes cargo test --release --workspace --test contracts -- --nocapture the_camera_stays_outside::
       ;;
     *) echo "tests/long.sh: no part '$part'; there are fuzz, release, aarch64, suites, bits, web, soak, crates and player" >&2 && exit 2 ;;
   esac

@@ -1,7 +1,12 @@
-# Sets `packages`, the arguments that tell Cargo what is tested: everything but the game, or with MARATHON_TEST_GAME everything.
-# The same in all scripts: other packages would give dependencies other features, and have them compiled again.
+# Sets the arguments that tell Cargo what is tested: `packages`, everything but the game, or with MARATHON_TEST_GAME everything;
+# `all_targets`, all but the examples that tests contain. The packages are the same in all scripts: others would give dependencies
+# other features, and have them compiled again.
 # shellcheck shell=bash disable=SC2034
 packages=(--workspace)
+# not `--benches`, which compiles every library once more
+all_targets=(--lib --bins --tests --bench '*' --example generate)
 if [ -z "${MARATHON_TEST_GAME:-}" ]; then
   packages+=(--exclude marathon-game --exclude bevy_marathon --exclude avian_props)
+else
+  all_targets+=(--example headless_png --example cost_of_a_frame)
 fi

@@ -18,7 +18,7 @@ scripts=(python examples/python docs/*.py docs/generator tests/docs)
 
 # the native module that ./test.sh has built: `--workspace` and a test among the targets keep the features of dependencies
 . tests/packages.sh
-cargo build --release "${packages[@]}" --lib --test errors_say_what_to_do
+cargo build --release "${packages[@]}" --lib --test imports_lead_down_the_stairs
 rm -rf "$site"
 mkdir -p "$site"
 cp -R python/marathon_rl "$site"

@@ -19,7 +19,7 @@ if [ -z "${MARATHON_MLAGENTS_PYTHON:-}" ] && [ ! -e .venv-mlagents/complete ]; t
   touch .venv-mlagents/complete
 fi
 # `--workspace` and a test among the targets keep the features of dependencies, and with them what ./test.sh has built
-targets=(--bin marathon-player --bin own_player --bin marathon --test errors_say_what_to_do)
+targets=(--bin marathon-player --bin own_player --bin marathon --test imports_lead_down_the_stairs)
 . tests/packages.sh
 if [ -n "${MARATHON_TEST_GAME:-}" ]; then
   targets+=(--bin marathon-game)

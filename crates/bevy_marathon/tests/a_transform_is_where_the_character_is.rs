@@ -1,11 +1,8 @@
 //! The transform of a ragdoll goes along with the character, and moves it.
 
-#[allow(dead_code, reason = "a part of it is enough")]
-mod common;
-
+use crate::common::{TICK, app, controller, run, state};
 use bevy::prelude::*;
 use bevy_marathon::prelude::*;
-use common::{TICK, app, controller, run, state};
 
 type Done = Result<(), Box<dyn std::error::Error>>;
 

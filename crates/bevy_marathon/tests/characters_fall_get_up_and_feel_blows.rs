@@ -1,12 +1,9 @@
 //! Steps, landings, skills, falls and blows of characters are messages. An app can make a character limp, weaken its limbs
 //! and give it its strength back.
 
-#[allow(dead_code, reason = "a part of it is enough")]
-mod common;
-
+use crate::common::{app, policy, run_until};
 use bevy::prelude::*;
 use bevy_marathon::prelude::*;
-use common::{app, policy, run_until};
 use marathon_physics::Model;
 use std::sync::Arc;
 use std::time::Duration;

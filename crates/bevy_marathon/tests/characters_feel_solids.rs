@@ -1,11 +1,8 @@
 //! Characters touch obstacles of the app and each other.
 
-#[allow(dead_code, reason = "a part of it is enough")]
-mod common;
-
+use crate::common::{TICK, app, controller, run};
 use bevy::prelude::*;
 use bevy_marathon::prelude::*;
-use common::{TICK, app, controller, run};
 
 type Done = Result<(), Box<dyn std::error::Error>>;
 

@@ -1,8 +1,6 @@
 //! A character goes in the direction of the world that an app names, whatever it faces and wherever its track lies.
 
-#[allow(dead_code, reason = "a part of it is enough")]
-mod common;
-
+use crate::common;
 use bevy::prelude::*;
 use bevy_marathon::prelude::*;
 use std::f32::consts::{PI, TAU};

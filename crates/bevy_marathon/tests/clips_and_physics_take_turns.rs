@@ -1,12 +1,9 @@
 //! A motion clip moves a character in place of the physics, and both hand it over to each other without a jump.
 
-#[allow(dead_code, reason = "a part of it is enough")]
-mod common;
-
+use crate::common::{TICK, app, assets, controller, run, state};
 use bevy::prelude::*;
 use bevy_marathon::MotionClip;
 use bevy_marathon::prelude::*;
-use common::{TICK, app, assets, controller, run, state};
 use marathon_motion::Clip;
 
 type Done = Result<(), Box<dyn std::error::Error>>;

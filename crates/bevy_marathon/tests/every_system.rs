@@ -1,12 +1,10 @@
 //! The systems of the plugin, one by one, in an app without a window.
 
-#[allow(dead_code, reason = "a part of it is enough")]
-mod common;
-
+use crate::common;
+use crate::common::{Log, app, policy, run_until};
 use bevy::prelude::*;
 use bevy_marathon::axes::to_game;
 use bevy_marathon::prelude::*;
-use common::{Log, app, policy, run_until};
 use marathon_render::Scene;
 use std::time::Duration;
 

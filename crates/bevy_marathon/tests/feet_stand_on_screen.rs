@@ -1,9 +1,7 @@
 //! The bars of locked feet: they stand still while they carry weight, the knees do not pop, and the physics does not notice.
 #![cfg(feature = "window")]
 
-#[allow(dead_code, reason = "a part of it is enough")]
-mod common;
-
+use crate::common;
 use bevy::asset::UnapprovedPathMode;
 use bevy::log::LogPlugin;
 use bevy::prelude::*;

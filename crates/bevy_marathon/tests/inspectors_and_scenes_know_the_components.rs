@@ -1,9 +1,7 @@
 //! Inspectors and scenes read and write components through reflection. Each component that an app spawns is registered. Plain data
 //! becomes a component.
 
-#[allow(dead_code, reason = "a part of it is enough")]
-mod common;
-
+use crate::common;
 use bevy::ecs::reflect::ReflectComponent;
 use bevy::prelude::*;
 use bevy::reflect::structs::DynamicStruct;

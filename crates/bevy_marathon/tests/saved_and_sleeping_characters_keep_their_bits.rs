@@ -1,12 +1,9 @@
 //! A character that is saved and restored, or that sleeps and wakes up, continues with the bits that it would have had. No other
 //! character changes a bit.
 
-#[allow(dead_code, reason = "a part of it is enough")]
-mod common;
-
+use crate::common::{app, policy, run_until};
 use bevy::prelude::*;
 use bevy_marathon::prelude::*;
-use common::{app, policy, run_until};
 use std::time::Duration;
 
 /// A stream of random numbers for the test (splitmix64).

@@ -2,9 +2,7 @@
 //! character in the middle of its picture.
 #![cfg(feature = "render")]
 
-#[allow(dead_code, reason = "a part of it is enough")]
-mod common;
-
+use crate::common;
 use bevy::prelude::*;
 use bevy_marathon::look::CameraMode;
 use bevy_marathon::prelude::*;

@@ -1,20 +1,16 @@
 //! The rover of the example `steer` drives at the velocity that a gamepad sets.
 #![cfg(feature = "window")]
 
-#[allow(dead_code, reason = "a part of it is enough")]
-mod common;
-
-#[path = "common/devices.rs"]
-mod devices;
 #[allow(dead_code, reason = "its window stays closed")]
 #[path = "../examples/steer.rs"]
 mod steer;
 
+use crate::common;
+use crate::devices::{pad, press, push};
 use bevy::input::InputPlugin;
 use bevy::input::gamepad::{GamepadAxis, GamepadButton};
 use bevy::prelude::*;
 use bevy_marathon::prelude::*;
-use devices::{pad, press, push};
 use std::time::Duration;
 
 #[test]

@@ -2,12 +2,9 @@
 //! lengths and distances, to the last bit, whatever the frame rate, the order in which the ragdolls came, and who runs
 //! beside them.
 
-#[allow(dead_code, reason = "a part of it is enough")]
-mod common;
-
+use crate::common::{Log, app, assets, policy, run_until};
 use bevy::prelude::*;
 use bevy_marathon::prelude::*;
-use common::{Log, app, assets, policy, run_until};
 use marathon_envs::{Options, Value};
 use marathon_learn::{
     Control, EvalOptions, Evaluation, IterationStats, Policy as Net, Snapshot, TrainConfig, evaluate, train,

@@ -1,8 +1,7 @@
 //! `marathon serve` streams agents to pages that know the token, and slow pages do not hold it up.
 
-mod common;
-
-use common::{json, marathon};
+use crate::common;
+use crate::common::{json, marathon};
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;

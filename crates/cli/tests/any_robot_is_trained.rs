@@ -1,8 +1,6 @@
 //! The path of a model is a task: it trains, resumes, is evaluated and drawn, from any folder.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use std::path::Path;
 
 #[test]

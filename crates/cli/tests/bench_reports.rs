@@ -1,8 +1,6 @@
 //! `marathon bench` measures what it documents, with output for people and for programs.
 
-mod common;
-
-use common::python;
+use crate::common::python;
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};

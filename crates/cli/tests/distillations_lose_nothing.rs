@@ -1,9 +1,7 @@
 //! `marathon distill` checks its output before it starts. After an interruption it resumes and writes the same bits as
 //! a distillation that was never interrupted.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use std::path::Path;
 use std::time::{Duration, Instant};
 

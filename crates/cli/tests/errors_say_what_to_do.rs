@@ -1,8 +1,7 @@
 //! Every error names the item and the place, the valid values, and the nearest valid choice.
 
-mod common;
-
-use common::{SMALL, fail, json, run, succeed};
+use crate::common;
+use crate::common::{SMALL, fail, json, run, succeed};
 
 #[track_caller]
 fn says(text: &str, parts: &[&str]) {

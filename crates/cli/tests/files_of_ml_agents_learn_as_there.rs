@@ -3,9 +3,7 @@
 //! (docs/studies/mlagents-agreement.md). Within 15 % is 418 and more. ML-Agents' unwritten defaults matter, and so does
 //! following the observation statistics: without `follow_statistics`, seed 1 fails (38).
 
-mod common;
-
-use common::*;
+use crate::common::*;
 
 #[test]
 fn hopper_stands_with_the_papers_settings() {

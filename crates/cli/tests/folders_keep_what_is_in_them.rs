@@ -1,9 +1,7 @@
 //! Training uses a new or empty folder, and never overwrites or deletes other files. A failed start leaves everything
 //! as it was, so that the corrected command works.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

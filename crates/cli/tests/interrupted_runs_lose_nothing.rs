@@ -2,9 +2,8 @@
 
 #![cfg(unix)]
 
-mod common;
-
-use common::*;
+use crate::common;
+use crate::common::*;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};

@@ -1,9 +1,7 @@
 //! `marathon average`: every number of the written policy is the mean over the policies of a run. The policy is for the
 //! user's task, and has no evaluation. Policies that do not match are refused by name.
 
-mod common;
-
-use common::{assert_no_leftovers, fail, read_json, shipped, succeed, tensors};
+use crate::common::{assert_no_leftovers, fail, read_json, shipped, succeed, tensors};
 use marathon_envs::options::Value;
 use marathon_learn::Policy;
 use std::path::{Path, PathBuf};

@@ -1,8 +1,6 @@
 //! `MARATHON_LIMITS` refuses what exceeds it, and nothing else. A value that is wrong ends the command with its name.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use std::process::Output;
 
 fn with(limits: &str, words: &[&str]) -> Output {

@@ -1,9 +1,7 @@
 //! `marathon motion` converts a recording to a checked clip in one command, draws it, retargets it to another
 //! character, and reports the problems of bad recordings.
 
-mod common;
-
-use common::{assert_no_leftovers, fail, json, recording, run, succeed};
+use crate::common::{assert_no_leftovers, fail, json, recording, run, succeed};
 use std::path::{Path, PathBuf};
 
 /// One of Marathon's clips.

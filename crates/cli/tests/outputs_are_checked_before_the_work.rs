@@ -1,9 +1,7 @@
 //! A command checks its output file before it starts: the ending, the folder, and that the file is not one of its
 //! inputs.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use std::time::{Duration, Instant};
 
 #[test]

@@ -1,9 +1,7 @@
 //! `marathon motion render --policy` and `marathon render --ghost` draw a policy together with the clip that it
 //! follows, and report the distance between them.
 
-mod common;
-
-use common::{assert_no_leftovers, fail, json, succeed};
+use crate::common::{assert_no_leftovers, fail, json, succeed};
 use marathon_envs::{Autoreset, VecEnvOptions};
 use marathon_runs::{Play, PolicySource};
 use serde_json::Value;

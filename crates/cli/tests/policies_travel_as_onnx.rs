@@ -1,9 +1,7 @@
 //! `marathon export` and `marathon import`: a policy acts the same after conversion to ONNX and back, and `eval`
 //! accepts both. A policy can be converted for other options.
 
-mod common;
-
-use common::{assert_no_leftovers, fail, json, shipped, succeed};
+use crate::common::{assert_no_leftovers, fail, json, shipped, succeed};
 use marathon_envs::options::Value;
 use marathon_learn::Policy;
 use serde_json::Value as Json;

@@ -2,9 +2,7 @@
 //! processes. The processes end with the run. If a process dies, the run ends within seconds and can be resumed with
 //! the same bits. Runs that processes cannot play are refused before anything is written.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 
 #[test]
 fn processes_change_nothing() {

@@ -1,8 +1,6 @@
 //! `marathon render` draws a policy as a strip or an animation and reports what it wrote.
 
-mod common;
-
-use common::{SMALL, assert_no_leftovers, json, succeed};
+use crate::common::{SMALL, assert_no_leftovers, json, succeed};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;

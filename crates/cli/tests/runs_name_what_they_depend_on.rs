@@ -1,9 +1,7 @@
 //! A run lists the outside files that it depends on. It resumes from any folder, and refuses files that have changed.
 //! The task in `run.json` takes precedence over the command line.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use std::path::Path;
 
 /// A small run of Gymnasium's hopper.

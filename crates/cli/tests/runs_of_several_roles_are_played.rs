@@ -2,9 +2,7 @@
 //! which lie in the same folder. The evaluation equals the one at the end of the training, and the picture shows the
 //! built ground. A missing policy is named.
 
-mod common;
-
-use common::{assert_no_leftovers, fail, json, read_json, succeed};
+use crate::common::{assert_no_leftovers, fail, json, read_json, succeed};
 use std::path::Path;
 
 const RENDERED: [&str; 8] = ["render", "run", "--out", "strip.png", "--seconds", "1", "--frames", "3"];

@@ -1,8 +1,6 @@
 //! A setting has one name in files, in `--set`, in `config show` and in `run.json`.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use std::path::Path;
 
 /// A file that comes with Marathon.

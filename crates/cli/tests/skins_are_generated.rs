@@ -1,8 +1,6 @@
 //! `marathon skin` writes a skin for an agent or an MJCF file, whole or not at all, and says what is wrong otherwise.
 
-mod common;
-
-use common::{assert_no_leftovers, fail, json, succeed};
+use crate::common::{assert_no_leftovers, fail, json, succeed};
 
 const BALL: &str =
     "<mujoco model='ball'><worldbody><body name='b'><freejoint/><geom size='.1'/></body></worldbody></mujoco>";

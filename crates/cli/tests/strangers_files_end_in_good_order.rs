@@ -1,9 +1,7 @@
 //! Files from another person may contain anything. The program uses them or reports the problem, within limits on time
 //! and memory. No text from a file reaches the terminal as a command.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use marathon_envs::options::{Options, Value};
 use marathon_learn::{Policy, PolicyMeta};
 use marathon_runs::TaskConfig;

@@ -2,9 +2,7 @@
 //! evaluating or resuming uses the same task. A clip in a file is one of them, and is stored with the run and the
 //! policy.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use serde_json::Value;
 use std::path::Path;
 

@@ -2,11 +2,8 @@
 //! and the results match the motion of the recordings. Only trainings are shorter, and pictures smaller. Commands that
 //! open a window or need other programs are left out.
 
-mod common;
-#[path = "common/foreign.rs"]
-mod foreign;
-
-use common::{json, read_json, succeed};
+use crate::common::{json, read_json, succeed};
+use crate::foreign;
 use marathon_motion::Clip;
 use std::path::Path;
 

@@ -2,9 +2,7 @@
 //! `assets/policies/hopper.safetensors`, bit for bit. After a change of bits, `marathon-studies reproduce
 //! --update` trains the shipped policies again.
 
-mod common;
-
-use common::{read_json, succeed, tensors};
+use crate::common::{read_json, succeed, tensors};
 use std::path::Path;
 
 #[test]

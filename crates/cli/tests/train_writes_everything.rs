@@ -1,8 +1,7 @@
 //! A run writes all documented files, and they agree with each other.
 
-mod common;
-
-use common::{SMALL, assert_no_leftovers, event_files, json, read_json, run, stderr, succeed, tensors};
+use crate::common;
+use crate::common::{SMALL, assert_no_leftovers, event_files, json, read_json, run, stderr, succeed, tensors};
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;

@@ -1,8 +1,6 @@
 //! Every key of a file of ML-Agents reaches the trainer, in both formats. This file has PPO's.
 
-mod common;
-
-use common::read;
+use crate::common::read;
 use marathon_config::{Loaded, default_for, parse, set};
 use marathon_learn::{Activation, Algorithm, Init, LrSchedule, Ratio, RewardKind, Schedule, TrainConfig};
 use std::path::{Path, PathBuf};

@@ -1,8 +1,6 @@
 //! Every key of a file of ML-Agents reaches the trainer: those of trainers other than PPO, and of rewards beside the task's.
 
-mod common;
-
-use common::read;
+use crate::common::read;
 use marathon_config::Loaded;
 use marathon_learn::{
     Acktr, Activation, Algorithm, Form, Imitation, LrSchedule, Novelty, RewardConfig, RewardKind, Sac, TrainConfig,

@@ -6,8 +6,7 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-const START: &str =
-    "<!-- all keys: MARATHON_BLESS=1 cargo test -p marathon-config --test the_reference_is_complete -->\n\n";
+const START: &str = "<!-- all keys: MARATHON_BLESS=1 cargo test -p marathon-config the_reference_is_complete:: -->\n\n";
 const END: &str = "<!-- end of all keys -->";
 
 /// Paths of the values of a document; the ends of a schedule are one value.

@@ -141,10 +141,14 @@ impl<A: Agent> AnyAgent for A {
             return Err(EnvError::Isa { isa: isa.name(), obstacle, best: Isa::best().name() });
         }
         let options = Agent::options(&*self).into_iter().map(|o| (o.name.to_string(), o.value)).collect();
-        #[cfg(feature = "double")]
+        #[cfg(all(feature = "double", not(test)))]
         if isa == Isa::F64 {
             return Ok(Arc::new(AgentFactory::<f64>::new(facts, options, self)?));
         }
+        // unit tests make no environments, and compile in a quarter of the time without these kernels
+        #[cfg(test)]
+        return Ok(Arc::new(AgentFactory::<f32>::new(facts, options, self)?));
+        #[cfg(not(test))]
         marathon_physics::with_single_lanes!(isa, T => Ok(Arc::new(AgentFactory::<T>::new(facts, options, self)?)))
     }
 }

@@ -1,8 +1,6 @@
 //! A state or action that is not finite ends its own agent's episode, is reported, and does not affect other agents.
 
-mod common;
-
-use common::{go_on, isas, make};
+use crate::common::{go_on, isas, make};
 use marathon_envs::{AgentState, Autoreset};
 
 #[test]

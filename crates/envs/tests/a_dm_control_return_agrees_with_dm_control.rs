@@ -12,10 +12,8 @@
 //!
 //! The other side is the installed `dm_control`, run by `tests/oracle/dm_control_tasks.py`.
 
-mod common;
-
-use common::numbers::largest;
-use common::{Noise, oracle, package};
+use crate::common::numbers::largest;
+use crate::common::{Noise, oracle, package};
 use marathon_envs::{AgentState, Autoreset, Options, Sigmoid, Step, Tolerance, Value, VecEnv, VecEnvOptions};
 use marathon_physics::lanes::Isa;
 use serde_json::{Value as Json, json};

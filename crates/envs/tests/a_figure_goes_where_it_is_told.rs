@@ -3,11 +3,10 @@
 //! documented formula, and adaptive starts fit the command. Style demonstrations are the observations that the clips
 //! produce.
 
-mod common;
-
+use crate::common;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use common::{action, isas, make};
+use crate::common::{action, isas, make};
 use marathon_envs::agents::marathon::marathon_man::clips;
 use marathon_envs::agents::marathon::marathon_man::gait::gaits;
 use marathon_envs::agents::marathon::marathon_man::steer::{MAX_HEADING_LAG, STYLE};

@@ -1,9 +1,7 @@
 //! The paper's controllers. Figures in a plane observe their command. The mean velocity is that of three decisions. The
 //! reward is the original's formula, with additional terms for standing still and for a late jump.
 
-mod common;
-
-use common::action;
+use crate::common::action;
 use marathon_envs::{Autoreset, Options, Step, VecEnv, VecEnvOptions, agent};
 use marathon_motion::dynamics::Motion;
 use marathon_physics::Model;

@@ -1,9 +1,8 @@
 //! The assault courses. Each agent has its own ground in each episode, observes it and stands on it. A curriculum rises
 //! with the distance covered. The reward is the documented formula.
 
-mod common;
-
-use common::{action, center, go_on};
+use crate::common;
+use crate::common::{action, center, go_on};
 use marathon_envs::{AgentState, Autoreset, Step, VecEnv, VecEnvOptions, agent};
 use marathon_motion::kinematics::Pose;
 use marathon_physics::Model;

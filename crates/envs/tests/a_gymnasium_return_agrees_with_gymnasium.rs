@@ -11,10 +11,8 @@
 //!
 //! The other side is the installed `gymnasium`, run by `tests/oracle/gymnasium_tasks.py`.
 
-mod common;
-
-use common::numbers::largest;
-use common::{Noise, oracle, package};
+use crate::common::numbers::largest;
+use crate::common::{Noise, oracle, package};
 use marathon_envs::{AgentState, Autoreset, Options, Step, Value, VecEnv, VecEnvOptions};
 use marathon_physics::lanes::Isa;
 use serde_json::{Value as Json, json};

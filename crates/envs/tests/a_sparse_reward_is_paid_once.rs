@@ -2,9 +2,7 @@
 //! clip's end. The last decision pays the distance from the start to the last foot contact, 1 for 20 m. The test
 //! computes the distance from the states and the observed contacts.
 
-mod common;
-
-use common::action;
+use crate::common::action;
 use marathon_envs::{Autoreset, Options, VecEnv, VecEnvOptions};
 use marathon_motion::kinematics::Pose;
 use marathon_physics::lanes::Isa;

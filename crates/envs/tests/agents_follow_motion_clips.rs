@@ -6,13 +6,11 @@
 //! [`Clip::qpos`] at times that never wrap around. The table of the environment wraps around and has to agree with
 //! them. One of the clips walks in circles.
 
-mod common;
-
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
-use common::{action, make, oracle, play};
+use crate::common::{action, make, oracle, play};
 use marathon_envs::agents::marathon::marathon_man::clips;
 use marathon_envs::{AgentState, Autoreset, Clips, NamedClip, Options, VecEnv, VecEnvOptions};
 use marathon_motion::kinematics::Pose;

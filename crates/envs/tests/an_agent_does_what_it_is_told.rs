@@ -2,11 +2,9 @@
 //! observed command. Commands do not depend on lanes, threads, slots or widths, and a snapshot continues them exactly.
 //! Memory and ground that a start draws reach the agent.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{action, isas};
+use crate::common::{action, isas};
 use marathon_envs::{
     Agent, BLOCK, BlockStep, CommandRange, Ctrl, EpisodeRng, Facts, Obs, Registry, Senses, Start, Step, Terms, VecEnv,
     VecEnvOptions, names,

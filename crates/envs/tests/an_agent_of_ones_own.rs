@@ -4,12 +4,11 @@
 //! numbers from the state in plain double precision. An agent with a wrong description is rejected with a helpful
 //! message.
 
-mod common;
-
+use crate::common;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use common::{action, isas};
+use crate::common::{action, isas};
 use marathon_envs::memory::Average;
 use marathon_envs::senses::{angle, clamp, unit};
 use marathon_envs::{

@@ -1,11 +1,9 @@
 //! The height of the ground at any point is that of the surface that the physics collides with, including its
 //! triangles. Each agent observes its own ground, at points relative to its heading.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{Noise, isas};
+use crate::common::{Noise, isas};
 use marathon_envs::{Agent, AgentState, Facts, Obs, Part, Registry, Senses, Terms, VecEnv, VecEnvOptions, names};
 use marathon_physics::lanes::{Isa, Real};
 

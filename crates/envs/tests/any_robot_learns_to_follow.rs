@@ -1,7 +1,6 @@
 //! The task for any model finds out what it needs: root, standing pose, feet, servos and speeds.
 
-mod common;
-
+use crate::common;
 use marathon_envs::agents::robot::arguments::RobotArguments;
 use marathon_envs::agents::robot::rig::Rig;
 use marathon_envs::agents::robot::servos::Drive;

@@ -1,9 +1,7 @@
 //! An agent has the same trajectory, bit for bit, in all autoreset modes: reset within the step that ended its episode,
 //! at the next step, or by the caller.
 
-mod common;
-
-use common::{action, make};
+use crate::common::{action, make};
 use marathon_envs::{Autoreset, Step, VecEnv, VecEnvOptions};
 
 const AGENTS: usize = 21;

@@ -4,9 +4,7 @@
 //! instruction set of single precision that this processor has. All observations, rewards and endings are equal to the
 //! bit.
 
-mod common;
-
-use common::{isas, make, play};
+use crate::common::{isas, make, play};
 use marathon_envs::{AgentState, Autoreset, Step, VecEnv};
 use marathon_physics::lanes::Isa;
 

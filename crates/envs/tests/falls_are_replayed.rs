@@ -2,9 +2,7 @@
 //! with its pose, velocities and gait. A figure that falls right after its start keeps the state from before the
 //! earlier fall. Without `replay_falls_prob`, or before any fall, episodes start as usual.
 
-mod common;
-
-use common::begun;
+use crate::common::begun;
 use marathon_envs::{AgentState, Step, VecEnv};
 use std::ops::RangeInclusive;
 

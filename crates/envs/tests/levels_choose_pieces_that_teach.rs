@@ -1,8 +1,7 @@
 //! Levels with a bank of pieces. Courses depend on the agent's own runs only: not on threads, nor on an interruption. Names
 //! of levels reach all kinds of ground.
 
-mod common;
-
+use crate::common;
 use marathon_envs::{Autoreset, VecEnv, VecEnvOptions, agent};
 
 const AGENTS: usize = 20;

@@ -1,11 +1,9 @@
 //! An environment that is saved, restored and continued equals one that never stopped, for any number of threads and
 //! any width.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::{go_on, isas, make, play};
+use crate::common::{go_on, isas, make, play};
 use marathon_envs::memory::Average;
 use marathon_envs::{
     Agent, Autoreset, BLOCK, BlockStep, Facts, ModelSource, Obs, Part, Registry, ResetNoise, Senses, Start, Step,

@@ -1,9 +1,7 @@
 //! The commanded Ant. It observes its command and its body relative to its heading. The commanded direction turns as
 //! commanded and waits. The reward is the documented formula, and lying on its back is a failure.
 
-mod common;
-
-use common::{action, make};
+use crate::common::{action, make};
 use marathon_envs::{AgentState, Autoreset, agent};
 use marathon_motion::dynamics::Motion;
 use marathon_motion::kinematics::Pose;

@@ -1,9 +1,8 @@
 //! Assault courses in the game: a policy runs, a player leads a runner, or builds the ground ahead of one by mouse and
 //! keys. Finished runs enter the table of the longest runs, and their replays match them bit for bit, ground included.
 
-#[path = "common/windowless.rs"]
-mod windowless;
-
+use crate::windowless;
+use crate::windowless::frames;
 use bevy::input::ButtonState;
 use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::input::mouse::{MouseButtonInput, MouseScrollUnit, MouseWheel};
@@ -19,7 +18,6 @@ use std::error::Error;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
-use windowless::frames;
 
 /// Where a course's ground has a place, m: its first point and the distance of its points.
 const FROM: f64 = -6.0;

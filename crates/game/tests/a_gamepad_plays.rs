@@ -1,12 +1,10 @@
 //! A gamepad does what keys do: raw events, as its driver sends them, become actions. No pad, no window needed.
 
-#[path = "../../bevy_marathon/tests/common/devices.rs"]
-mod devices;
-
+use crate::devices;
+use crate::devices::{key, pull};
 use bevy::input::gamepad::GamepadButton;
 use bevy::input::{ButtonState, InputPlugin};
 use bevy::prelude::*;
-use devices::{key, pull};
 use marathon_game::app::{Action, ActionPressed, Bindable, Bindings, KeysPlugin, Press};
 
 #[derive(Resource, Default)]

@@ -1,26 +1,22 @@
 //! A player steers characters in `marathon-game` with sticks and arrow keys. The rover of `examples/rover.rs` takes a velocity; the
 //! trained one of the plugin's example `steer` drives at it.
 
-#[path = "../../bevy_marathon/tests/common/devices.rs"]
-mod devices;
-#[path = "common/windowless.rs"]
-mod windowless;
-
 #[allow(dead_code, reason = "its window stays closed")]
 #[path = "../../bevy_marathon/examples/steer.rs"]
 mod steer;
 
+use crate::devices::{key, pad, press, pull, push};
+use crate::windowless;
+use crate::windowless::frames;
 use bevy::input::ButtonState;
 use bevy::input::gamepad::{GamepadAxis, GamepadButton};
 use bevy::prelude::*;
 use bevy_marathon::look::CameraMode;
 use bevy_marathon::prelude::*;
 use clap::Parser;
-use devices::{key, pad, press, pull, push};
 use marathon_game::app::{Action, Actor, Args, Bindings, Steering};
 use std::sync::LazyLock;
 use std::time::Duration;
-use windowless::frames;
 
 /// Twenty milliseconds, the rover's decision.
 const FRAME: Duration = Duration::from_millis(20);

@@ -1,14 +1,12 @@
 //! A recording made with R is kept, whatever happens: other keys, other characters, the end of the game.
 
-#[path = "common/windowless.rs"]
-mod windowless;
-
+use crate::windowless;
+use crate::windowless::frames;
 use clap::ValueEnum;
 use marathon_game::app::{Action, Recording, TrainingRun};
 use std::error::Error;
 use std::path::Path;
 use std::time::Duration;
-use windowless::frames;
 
 /// The recordings in a folder.
 fn recordings(folder: &Path) -> Result<Vec<Recording>, Box<dyn Error>> {

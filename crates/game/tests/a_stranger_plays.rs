@@ -1,11 +1,9 @@
 //! A stranger plays: prompts teach the controls, the menus work by a gamepad alone, the menu key pauses, and no sequence of
 //! presses and clicks leads to a panic or to a state without a way out.
 
-#[path = "../../bevy_marathon/tests/common/devices.rs"]
-mod devices;
-#[path = "common/windowless.rs"]
-mod windowless;
-
+use crate::devices;
+use crate::windowless;
+use crate::windowless::frames;
 use bevy::input::ButtonState;
 use bevy::input::gamepad::{GamepadAxis, GamepadButton};
 use bevy::input::mouse::{MouseButtonInput, MouseMotion, MouseScrollUnit, MouseWheel};
@@ -18,7 +16,6 @@ use marathon_game::app::{
 };
 use std::error::Error;
 use std::time::Duration;
-use windowless::frames;
 
 const FRAME: Duration = Duration::from_millis(20);
 

@@ -1,11 +1,9 @@
 //! Every mode of the menu can follow every mode. After each transition, characters and policy are those of the new mode. The
 //! screen shows no error, and nothing of the former mode is left.
 
-#[path = "../../bevy_marathon/tests/common/devices.rs"]
-mod devices;
-#[path = "common/windowless.rs"]
-mod windowless;
-
+use crate::devices;
+use crate::windowless;
+use crate::windowless::frames;
 use bevy::input::ButtonState;
 use bevy::prelude::*;
 use bevy_marathon::prelude::*;
@@ -18,7 +16,6 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-use windowless::frames;
 
 /// The game with a table of its own, in a folder in which it can save policies.
 fn game(folder: &Path, words: &[&str]) -> App {

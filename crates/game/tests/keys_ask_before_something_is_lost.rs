@@ -1,11 +1,9 @@
 //! A key that would lose something asks first: the same key means yes, S saves, Esc means no. Binding a key has no side
 //! effects.
 
-#[path = "../../bevy_marathon/tests/common/devices.rs"]
-mod devices;
-#[path = "common/windowless.rs"]
-mod windowless;
-
+use crate::devices;
+use crate::windowless;
+use crate::windowless::frames;
 use bevy::input::ButtonState;
 use bevy::prelude::*;
 use marathon_game::app::{
@@ -13,7 +11,6 @@ use marathon_game::app::{
 };
 use std::error::Error;
 use std::time::{Duration, Instant};
-use windowless::frames;
 
 fn app(words: &[&str]) -> App {
     windowless::game(words, Duration::from_millis(20), |_| ())

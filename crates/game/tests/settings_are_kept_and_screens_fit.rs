@@ -1,8 +1,7 @@
 //! Settings are kept in one readable file; a bad file is renamed and reported. All screens fit windows of every size.
 
-#[path = "common/windowless.rs"]
-mod windowless;
-
+use crate::windowless;
+use crate::windowless::frames;
 use bevy::prelude::*;
 use bevy::window::WindowResolution;
 use bevy_egui::{EguiContext, PrimaryEguiContext, egui};
@@ -12,7 +11,6 @@ use marathon_game::app::{
 };
 use std::error::Error;
 use std::time::Duration;
-use windowless::frames;
 
 const FRAME: Duration = Duration::from_millis(20);
 

@@ -1,8 +1,7 @@
 //! The systems of the app, driven by its keys, without a window and without drawing.
 
-#[path = "common/windowless.rs"]
-mod windowless;
-
+use crate::windowless;
+use crate::windowless::frames;
 use bevy::input::ButtonState;
 use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::prelude::*;
@@ -17,7 +16,6 @@ use marathon_game::app::{
 use marathon_render::Scene;
 use std::path::Path;
 use std::time::{Duration, Instant};
-use windowless::frames;
 
 fn app(words: &[&str]) -> App {
     windowless::game(words, Duration::from_millis(20), |_| ())

@@ -1,8 +1,7 @@
 //! The player drags a limb, makes a character limp, and keeps the last seconds as a film. Steps, balls and falls are heard.
 
-#[path = "common/windowless.rs"]
-mod windowless;
-
+use crate::windowless;
+use crate::windowless::frames;
 use bevy::input::ButtonState;
 use bevy::input::mouse::MouseButtonInput;
 use bevy::prelude::*;
@@ -15,7 +14,6 @@ use marathon_game::app::{
 use std::error::Error;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use windowless::frames;
 
 /// The sounds of the test so far.
 #[derive(Resource, Default)]

@@ -1,9 +1,7 @@
 //! Contract: agents that are stepped all at once ([`BatchAdapter`]) give the same training as agents in blocks: the same
 //! bits, for any number of threads and over an interruption. A task that fails ends the run with the reason.
 
-mod common;
-
-use common::{silent, small_config};
+use crate::common::{silent, small_config};
 use marathon_envs::{
     AgentShards, BatchAdapter, BatchTask, BatchTaskError, BatchTaskFailed, Shard, ShardFactory, Spec, StepMut, VecEnv,
     VecEnvOptions, registry,

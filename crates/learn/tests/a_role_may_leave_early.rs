@@ -2,11 +2,9 @@
 //! failure ends its last decision without a further value, and later events do not affect its values. The other roles
 //! keep learning. Interruptions and threads do not change the result.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::silent;
+use crate::common::silent;
 use marathon_envs::{Agent, Facts, Obs, Registry, RoleFacts, Senses, ShardFactory, Terms, names};
 use marathon_learn::{Checkpoint, Control, IterationStats, Snapshot, TrainConfig, train};
 use marathon_physics::lanes::{Isa, Real};

@@ -1,9 +1,7 @@
 //! A run that a caller steps iteration by iteration equals the run of `train`: the same numbers, policies and
 //! checkpoints. The caller may stop at any moment.
 
-mod common;
-
-use common::{PuckTask, silent, small_config, small_of};
+use crate::common::{PuckTask, silent, small_config, small_of};
 use marathon_learn::{Control, IterationStats, Snapshot, TrainLoop, train};
 use marathon_physics::lanes::Isa;
 

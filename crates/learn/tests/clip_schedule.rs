@@ -1,8 +1,6 @@
 //! The clip range moves linearly from `clip.from` to `clip.to` over the run's steps, also across an interruption.
 
-mod common;
-
-use common::{PuckTask, ppo, silent, small_config};
+use crate::common::{PuckTask, ppo, silent, small_config};
 use marathon_learn::{Checkpoint, Control, IterationStats, Schedule, Snapshot, TrainConfig, train};
 use marathon_physics::lanes::Isa;
 

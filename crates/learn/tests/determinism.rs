@@ -1,8 +1,6 @@
 //! The same seed gives the same policy for any number of threads and any vector width.
 
-mod common;
-
-use common::{PuckTask, ppo, silent, small_config, small_of};
+use crate::common::{PuckTask, ppo, silent, small_config, small_of};
 use marathon_learn::{Activation, LrSchedule, TrainConfig, TrainOutput, train};
 use marathon_physics::lanes::Isa;
 

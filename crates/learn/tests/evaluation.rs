@@ -1,8 +1,6 @@
 //! An evaluation has the requested number of episodes, the same ones for all threads and widths.
 
-mod common;
-
-use common::{PuckTask, silent, small_config};
+use crate::common::{PuckTask, silent, small_config};
 use marathon_envs::{BLOCK, BlockStep, ShardFactory};
 use marathon_learn::{BlockPolicy, EvalOptions, Policy, evaluate, train};
 use marathon_physics::lanes::Isa;

@@ -1,9 +1,7 @@
 //! One, two, four or eight agents are trained like any others. Training and reports use only their data, though a block
 //! has sixteen lanes, and the promises of equal bits hold.
 
-mod common;
-
-use common::{PuckTask, learning_config, ppo, silent, small_config};
+use crate::common::{PuckTask, learning_config, ppo, silent, small_config};
 use marathon_envs::{BLOCK, BlockStep, EnvError, Shard, ShardFactory, Spec};
 use marathon_learn::{Algorithm, Control, IterationStats, Ratio, Snapshot, TrainConfig, evaluate, train};
 use marathon_physics::lanes::Isa;

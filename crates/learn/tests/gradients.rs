@@ -1,9 +1,7 @@
 //! Derivatives equal finite differences, in double precision lanes, for every activation, both value losses and both
 //! ratios.
 
-mod common;
-
-use common::numbers::{noise, worst};
+use crate::common::numbers::{noise, worst};
 use marathon_learn::algorithms::loss::{Loss, LossSums, Objective};
 use marathon_learn::lanes::buffer::Blocks;
 use marathon_learn::nets::gaussian::Gaussian;

@@ -2,11 +2,9 @@
 //! differences. It teaches a behavior without a task reward. Runs stay deterministic and resumable. Invalid
 //! demonstrations are refused.
 
-mod common;
-
-use common::numbers::{noise, noise_f32, worst};
-use common::oracle;
-use common::{PuckTask, learning_config, silent, small_config};
+use crate::common::numbers::{noise, noise_f32, worst};
+use crate::common::oracle;
+use crate::common::{PuckTask, learning_config, silent, small_config};
 use marathon_envs::{BlockStep, Demonstrations, EnvError, ObsGroup, Shard, ShardFactory, Spec};
 use marathon_learn::lanes::buffer::Blocks;
 use marathon_learn::rewards::Purpose;

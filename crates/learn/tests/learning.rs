@@ -1,8 +1,7 @@
 //! The trainer learns: it solves a task with drift, limits and unscaled observations within seconds.
 
-mod common;
-
-use common::{PuckTask, learning_config, ppo};
+use crate::common;
+use crate::common::{PuckTask, learning_config, ppo};
 use marathon_learn::{
     A2c, Acktr, Activation, Algorithm, Control, IterationStats, LrSchedule, Sac, Schedule, Snapshot, TrainConfig,
     evaluate, train,

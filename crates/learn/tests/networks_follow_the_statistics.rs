@@ -2,10 +2,8 @@
 //! networks change with them, so the policy acts as before. Without it, the policy acts differently although it learned
 //! nothing.
 
-mod common;
-
-use common::numbers::noise_f32 as noise;
-use common::{PuckTask, ppo, silent, small_config, small_of};
+use crate::common::numbers::noise_f32 as noise;
+use crate::common::{PuckTask, ppo, silent, small_config, small_of};
 use marathon_learn::nets::mlp::Mlp;
 use marathon_learn::{Activation, Control, Init, IterationStats, LrSchedule, Normalizer, Snapshot, train};
 use marathon_physics::lanes::Isa;

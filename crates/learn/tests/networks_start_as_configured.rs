@@ -1,8 +1,6 @@
 //! Every network of a run starts with the configured initialization, including SAC's second value network.
 
-mod common;
-
-use common::{PuckTask, small_of};
+use crate::common::{PuckTask, small_of};
 use marathon_learn::{BLOCK, Init, TrainLoop};
 use marathon_physics::lanes::Isa;
 use safetensors::SafeTensors;

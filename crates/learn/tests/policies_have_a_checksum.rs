@@ -1,9 +1,7 @@
 //! A policy file contains its own checksum. A file with a changed byte or without a checksum is refused with an error
 //! that names the checksum. The policies that ship have checksums.
 
-mod common;
-
-use common::{PuckTask, silent, small_config};
+use crate::common::{PuckTask, silent, small_config};
 use marathon_learn::{Policy, train};
 use marathon_physics::lanes::Isa;
 use std::path::Path;

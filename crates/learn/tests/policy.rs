@@ -1,8 +1,6 @@
 //! A saved policy reloads to the same actions, one row or many blocks at a time. Damaged files are refused.
 
-mod common;
-
-use common::{PuckTask, silent, small_config};
+use crate::common::{PuckTask, silent, small_config};
 use marathon_envs::ShardFactory;
 use marathon_learn::{Activation, BLOCK, BlockPolicy, EvalOptions, Policy, evaluate, train};
 use marathon_physics::lanes::Isa;

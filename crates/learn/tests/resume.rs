@@ -1,9 +1,7 @@
 //! A run that is interrupted between any two iterations and resumed gives the bits of an uninterrupted one. Damaged
 //! checkpoints are refused with a reason.
 
-mod common;
-
-use common::{PuckTask, silent, small_config, small_of};
+use crate::common::{PuckTask, silent, small_config, small_of};
 use marathon_learn::{Checkpoint, Control, Error, IterationStats, Snapshot, TrainConfig, train};
 use marathon_physics::lanes::Isa;
 use serde_json::json;

@@ -1,9 +1,7 @@
 //! A run whose rollouts are played elsewhere gives the bits of one that plays them itself, for any number of players,
 //! even if players are lost and replaced. An abandoned run keeps what it learned. Invalid answers are refused.
 
-mod common;
-
-use common::{PuckTask, silent, small_config};
+use crate::common::{PuckTask, silent, small_config};
 use marathon_learn::{
     A2c, Algorithm, Checkpoint, Control, Deliver, IterationStats, LrSchedule, Novelty, Player, Players, RewardConfig,
     RewardKind, TrainConfig, TrainOutput, train_with,

@@ -1,10 +1,8 @@
 //! Rewards for novelty: their gradients equal finite differences in double precision, and they fade where the networks
 //! have learned. Runs stay deterministic and resumable, and still learn the task.
 
-mod common;
-
-use common::numbers::{noise, worst};
-use common::{PuckTask, learning_config, silent, small_config};
+use crate::common::numbers::{noise, worst};
+use crate::common::{PuckTask, learning_config, silent, small_config};
 use marathon_learn::rewards::Step;
 use marathon_learn::rewards::curiosity::Curiosity;
 use marathon_learn::rewards::rnd::Rnd;

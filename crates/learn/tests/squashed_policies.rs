@@ -1,9 +1,7 @@
 //! The squashed policy of SAC: derivatives of its objective equal finite differences in double precision, and its
 //! log-probabilities belong to a density.
 
-mod common;
-
-use common::numbers::noise;
+use crate::common::numbers::noise;
 use marathon_learn::BLOCK;
 use marathon_learn::lanes::buffer::Blocks;
 use marathon_learn::nets::squash::{Draw, Objective};

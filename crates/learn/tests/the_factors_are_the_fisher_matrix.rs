@@ -2,9 +2,7 @@
 //! for many in a network of one layer. Otherwise they are means over the samples. The natural gradient solves with
 //! them, and in a linear policy a step causes the requested divergence.
 
-mod common;
-
-use common::numbers::noise_f32 as noise;
+use crate::common::numbers::noise_f32 as noise;
 use marathon_learn::lanes::buffer::Blocks;
 use marathon_learn::nets::mlp::Mlp;
 use marathon_learn::optim::kfac::Layer;

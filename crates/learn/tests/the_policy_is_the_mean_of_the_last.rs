@@ -1,9 +1,7 @@
 //! A run with `policy_average` returns the mean of the policies of its last part, for any interruptions and number of
 //! threads. The learned parameters stay the same to the bit.
 
-mod common;
-
-use common::{PuckTask, silent, small_config};
+use crate::common::{PuckTask, silent, small_config};
 use marathon_learn::{Checkpoint, Control, IterationStats, Policy, Snapshot, TrainConfig, TrainOutput, train};
 use marathon_physics::lanes::Isa;
 

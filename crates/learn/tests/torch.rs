@@ -1,9 +1,7 @@
 //! Networks, losses and gradients agree with PyTorch's to 1e-5, in single precision on every instruction set.
 
-mod common;
-
-use common::numbers::noise_f32 as noise;
-use common::oracle;
+use crate::common::numbers::noise_f32 as noise;
+use crate::common::oracle;
 use marathon_learn::algorithms::loss::{Loss, LossSums, Objective};
 use marathon_learn::lanes::buffer::Blocks;
 use marathon_learn::nets::gaussian::Gaussian;

@@ -3,11 +3,9 @@
 //! opponent's actions have no effect, the runner learns to the bit what it learns alone. A role that skips decisions
 //! keeps its last action. Threads, widths and interruptions do not change any role's bits.
 
-mod common;
-
 use std::sync::Arc;
 
-use common::silent;
+use crate::common::silent;
 use marathon_envs::{
     Agent, BLOCK, BlockStep, EnvError, Facts, Obs, Part, Registry, ResetNoise, RoleFacts, Senses, Shard, ShardFactory,
     Spec, Start, Terms, names,

@@ -2,9 +2,7 @@
 //! describes what happened. `marathon-player` then exits with a code other than 0. The player waits for a busy trainer.
 //! Requests of a trainer are checked before anything is created.
 
-mod common;
-
-use common::{FakeTrainer, close, listen, reset};
+use crate::common::{FakeTrainer, close, listen, reset};
 use marathon_mlagents::{BehaviorOptions, Log, Player, PlayerError, PlayerOptions};
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};

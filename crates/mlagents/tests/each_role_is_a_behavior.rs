@@ -2,11 +2,8 @@
 //! its own agent numbers. A role that skips decisions has infos when it decides and when an episode ends. In between,
 //! its last action stays, and its rewards are summed. The test compares everything with the task in a `VecEnv`.
 
-mod common;
-#[path = "common/tag.rs"]
-mod tag;
-
-use common::{FakeTrainer, act, close, listen, reset};
+use crate::common::{FakeTrainer, act, close, listen, reset};
+use crate::tag;
 use marathon_envs::{Autoreset, Options, Step, VecEnv, VecEnvOptions};
 use marathon_mlagents::channels::PARAMETERS;
 use marathon_mlagents::wire::{AgentInfo, AgentInfoList, UnityMessage};

@@ -2,9 +2,7 @@
 //! command is answered with one info per agent, and one more for each ended episode. Behaviors are described once. Any
 //! mismatch ends the conversation with an error that says what was found and expected.
 
-mod common;
-
-use common::{FakeTrainer, close, listen, reset, step};
+use crate::common::{FakeTrainer, close, listen, reset, step};
 use marathon_mlagents::wire::{AgentInfo, AgentInfoList, UnityMessage};
 use marathon_mlagents::{BehaviorOptions, Log, Player, PlayerError, PlayerOptions, Turn};
 use prost::Message;

@@ -1,9 +1,7 @@
 //! In every frame of the shipped clips, bodies have the poses of MuJoCo's `mj_kinematics`, and velocities equal those
 //! of `mj_differentiatePos`.
 
-mod common;
-
-use common::{all_shipped, file, model, oracle, rows, shipped};
+use crate::common::{all_shipped, file, model, oracle, rows, shipped};
 use glam::{DQuat, DVec3};
 use marathon_motion::kinematics::Pose;
 use serde_json::json;

@@ -1,9 +1,7 @@
 //! A clip's velocities match its positions, cycles continue without a seam, edits have their documented effect, and
 //! files keep every bit.
 
-mod common;
-
-use common::{all_shipped, model, shipped, wave, waves};
+use crate::common::{all_shipped, model, shipped, wave, waves};
 use glam::{DQuat, DVec3};
 use marathon_motion::kinematics::Pose;
 use marathon_motion::{Clip, Cycle};

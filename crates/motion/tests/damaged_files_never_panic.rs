@@ -1,8 +1,6 @@
 //! Readers do not panic on randomly damaged files, and name the file in every error.
 
-mod common;
-
-use common::shipped;
+use crate::common::shipped;
 use marathon_motion::{Clip, import};
 
 /// Reproducible pseudorandom numbers (Steele, Lea and Flood, splitmix64).

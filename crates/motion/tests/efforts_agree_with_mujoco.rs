@@ -1,9 +1,8 @@
 //! Inverse dynamics equals MuJoCo's `mj_inverse` without contacts, and so do momentum and center of mass. A character
 //! thrown into the air flies freely, and the ground carries one that stands.
 
-mod common;
-
-use common::{model, oracle, rows, shipped, waves};
+use crate::common;
+use crate::common::{model, oracle, rows, shipped, waves};
 use marathon_motion::dynamics::{Motion, inverse};
 use marathon_motion::{About, Clip, Cycle, Layout, contacts, efforts, soles};
 use marathon_physics::Model;

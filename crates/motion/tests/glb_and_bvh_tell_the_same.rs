@@ -1,9 +1,7 @@
 //! The same motion in a `.glb` and in a BVH file gives the same clip. The `.glb` has bones with other rest frames, a
 //! scaled and rotated node above them, and binary data.
 
-mod common;
-
-use common::model;
+use crate::common::model;
 use glam::{DQuat, DVec3};
 use marathon_motion::{Clip, Mapping, import, retarget};
 use serde_json::json;

@@ -1,8 +1,6 @@
 //! Invalid files are refused with their name and the line, entry or frame, without a panic.
 
-mod common;
-
-use common::{file, model, shipped};
+use crate::common::{file, model, shipped};
 use marathon_motion::import::{self, Reading};
 use marathon_motion::{About, Animation, Clip, Mapping, MotionError};
 

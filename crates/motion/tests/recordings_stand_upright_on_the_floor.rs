@@ -1,9 +1,7 @@
 //! Recordings with different rest poses, floors and up axes give the same motion.
 
-mod common;
-
-use common::bvh::{ARMS, HIPS, JOINTS, Layout, Rest, Truth, usual, y_up};
-use common::{all_shipped, model};
+use crate::common::bvh::{ARMS, HIPS, JOINTS, Layout, Rest, Truth, usual, y_up};
+use crate::common::{all_shipped, model};
 use glam::{DQuat, DVec3};
 use marathon_motion::import::{Reading, Up};
 use marathon_motion::{Animation, Mapping, fit, import, retarget};

@@ -1,9 +1,7 @@
 //! Retargeting respects limits, ground, contacts, bones and balance. The identity mapping reproduces the clip. Shipped
 //! clips have no warnings.
 
-mod common;
-
-use common::{all_shipped, file, model, shipped};
+use crate::common::{all_shipped, file, model, shipped};
 use glam::{DQuat, DVec3};
 use marathon_motion::kinematics::Pose;
 use marathon_motion::{About, Animation, Clip, Fit, Layout, Mapping, check, efforts, fit, import, retarget, soles};

@@ -1,9 +1,7 @@
 //! A skeleton that follows a model moves like the model. The model's own bones move exactly alike. Another character's
 //! limbs stay parallel to the model's and its hips coincide, whatever its lengths, unit and rest pose.
 
-mod common;
-
-use common::{file, model, shipped};
+use crate::common::{file, model, shipped};
 use glam::{DQuat, DVec3};
 use marathon_motion::kinematics::Pose;
 use marathon_motion::{Animation, Bone, Keyframe, Mapping, Skeleton, SkeletonPoser};

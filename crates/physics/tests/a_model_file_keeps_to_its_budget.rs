@@ -4,8 +4,7 @@
 //! reader takes quadratic time.
 
 #[cfg(unix)]
-mod common;
-
+use crate::common;
 use marathon_physics::{Model, Sim, SimOptions};
 use std::time::{Duration, Instant};
 

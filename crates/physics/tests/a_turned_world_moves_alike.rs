@@ -5,9 +5,8 @@
 //! planar models (hopper, walker, cheetah, pendulums) are solved in three components of spatial vectors, and in all six
 //! once they are rotated. The test therefore also compares the two.
 
-mod common;
-
-use common::numbers::distance;
+use crate::common;
+use crate::common::numbers::distance;
 use marathon_physics::lanes::Real;
 use marathon_physics::model::Cone;
 use marathon_physics::model::JointType;

@@ -5,13 +5,9 @@
 //! MuJoCo's states, sensors, accelerations and actuator forces every ten steps. From MuJoCo's states, the other lane
 //! types find the same accelerations up to their rounding.
 
-mod common;
-#[path = "common/motions.rs"]
-mod motions;
-
+use crate::motions::{Case, case, compare};
 use marathon_physics::Model;
 use marathon_physics::spec::{Actuator, Kind, ModelSpec};
-use motions::{Case, case, compare};
 
 /// An arm with a ball joint on a turntable, and another arm on the same turntable.
 macro_rules! arms {

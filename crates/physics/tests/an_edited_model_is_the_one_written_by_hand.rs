@@ -3,9 +3,7 @@
 //! References to removed elements go with them, and keyframes keep their meaning. A wrong name is an error with the nearest
 //! one, and an edit that fails changes nothing.
 
-mod common;
-
-use common::{shipped, workspace};
+use crate::common::{shipped, workspace};
 use marathon_physics::Model;
 use marathon_physics::mjcf::MjcfError;
 use marathon_physics::spec::*;

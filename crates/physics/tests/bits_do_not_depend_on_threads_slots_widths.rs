@@ -6,8 +6,7 @@
 //! the solver. All features are on: contacts between moving bodies, elliptic cones, terrain, convex shapes, equality constraints,
 //! tendons, activations, pushes, mocap bodies, and each agent's own constants and ground.
 
-mod common;
-
+use crate::common;
 use marathon_physics::model::Solver;
 use marathon_physics::{Batch, BatchOptions, Isa, Model, Variation};
 use std::path::PathBuf;

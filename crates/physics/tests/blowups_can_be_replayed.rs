@@ -1,7 +1,6 @@
 //! Contract: when an agent's state becomes non-finite, its last states can be saved and replayed to the same bits.
 
-mod common;
-
+use crate::common;
 use marathon_physics::{Batch, BatchOptions, Blowup, Model};
 
 #[test]

@@ -4,9 +4,8 @@
 //! MuJoCo makes such constraints harder than double precision resolves. Here single precision has the accelerations and
 //! velocities of double precision to 1e-2, in every lane width, and both stay near MuJoCo's next velocities.
 
-mod common;
-
-use common::numbers::{distance, largest, numbers};
+use crate::common;
+use crate::common::numbers::{distance, largest, numbers};
 use marathon_physics::lanes::Real;
 use marathon_physics::{Group, Isa, Model, Readings, Sim, SimOptions, Work, with_lanes};
 use serde_json::{Value, json};

@@ -5,9 +5,8 @@
 //! MuJoCo's tolerance of 1e-6 m per contact differ by more than rounding, and rolling bodies amplify that. Upright
 //! cylinders have quadrilaterals of contacts with equal areas, among which rounding chooses.
 
-mod common;
-
-use common::numbers::largest;
+use crate::common;
+use crate::common::numbers::largest;
 use marathon_physics::lanes::Isa;
 use marathon_physics::{Batch, BatchOptions, Model};
 use serde_json::{Value, json};

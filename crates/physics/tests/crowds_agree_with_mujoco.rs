@@ -7,8 +7,7 @@
 //! Crowded agents do not change the bits of others, and their own bits do not depend on others. The work is
 //! proportional to the number of separate islands.
 
-mod common;
-
+use crate::common;
 use marathon_physics::lanes::Real;
 use marathon_physics::model::JointType;
 use marathon_physics::workload::Uniform;

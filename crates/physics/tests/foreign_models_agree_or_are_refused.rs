@@ -13,9 +13,8 @@
 //! `MARATHON_MODELS=FOLDER` tests the models of a folder instead. `docs/research/models.md` lists the result of each file. The
 //! test fails if the list is out of date; run it with `MARATHON_BLESS=1` to update the list.
 
-mod common;
-
-use common::numbers::{distance, largest};
+use crate::common;
+use crate::common::numbers::{distance, largest};
 use marathon_physics::mjcf::{MjcfError, MjcfErrorKind};
 use marathon_physics::model::{Geom, Hull, Solver};
 use marathon_physics::{Group, Model, Readings, Sim, SimError, SimOptions, Work};
@@ -343,7 +342,7 @@ This page lists every model file of the Python packages that the tests install, 
 out of date:
 
 ```text
-MARATHON_BLESS=1 cargo test --release -p marathon-physics --test foreign_models_agree_or_are_refused
+MARATHON_BLESS=1 cargo test --release -p marathon-physics foreign_models_agree_or_are_refused::
 ```
 
 The test draws 20 random states of each model: poses within the joint limits and a little beyond, any orientation, random velocities and

@@ -6,9 +6,8 @@
 //! and tendons, several geoms per body, declared pairs, islands, low caps of the first solver, and all integrators.
 //! Bits do not depend on the width of the lanes.
 
-mod common;
-
-use common::numbers::{distance, largest, numbers};
+use crate::common;
+use crate::common::numbers::{distance, largest, numbers};
 use marathon_physics::lanes::{Isa, Real};
 use marathon_physics::{Batch, BatchOptions, Group, Model, Readings, Sim, SimOptions, Work};
 use serde::Deserialize;

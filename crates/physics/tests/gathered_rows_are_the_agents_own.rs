@@ -1,8 +1,7 @@
 //! Contract: the output of [`Batch::gather`] for all agents equals the readings of each agent, for any number of
 //! threads and any lane width. Contacts are those of the last step.
 
-mod common;
-
+use crate::common;
 use marathon_physics::{Batch, BatchOptions, Isa, Model, Quantity};
 
 const AGENTS: usize = 21;

@@ -3,11 +3,7 @@
 //! Small models with every kind of joint, actuators, tendons and constraints spin fast. Double precision follows
 //! MuJoCo's states, sensors and accelerations every ten steps.
 
-mod common;
-#[path = "common/motions.rs"]
-mod motions;
-
-use motions::{Case, case, compare};
+use crate::motions::{Case, case, compare};
 
 /// A chain of every kind of joint on a body that `$root` moves, an arm beside it, and a body that stands alone.
 macro_rules! chain {

@@ -3,9 +3,7 @@
 //! The motions are smooth: a chain of every kind of joint on a tumbling body, with springs, dampers, motors with
 //! activations and a medium, and a free top. The reference is Runge-Kutta with a far smaller step.
 
-mod common;
-
-use common::numbers::distance;
+use crate::common::numbers::distance;
 use marathon_physics::model::Integrator;
 use marathon_physics::{Group, Model, Sim, SimOptions, Work};
 

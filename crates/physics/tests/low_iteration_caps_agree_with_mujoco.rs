@@ -6,9 +6,8 @@
 //! holds for every cap, both friction cones and both impedance ratios that such files use. Robots stand as in MuJoCo,
 //! for every lane width.
 
-mod common;
-
-use common::numbers::{distance, numbers};
+use crate::common;
+use crate::common::numbers::{distance, numbers};
 use marathon_physics::lanes::{Isa, Real};
 use marathon_physics::{Batch, BatchOptions, Group, Model, Readings, Sim, SimOptions, Work};
 use serde::Deserialize;

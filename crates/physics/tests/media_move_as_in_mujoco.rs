@@ -4,11 +4,7 @@
 //! follows MuJoCo's states, sensors and accelerations every ten steps. From MuJoCo's states, the other lane types find
 //! the same accelerations up to their rounding.
 
-mod common;
-#[path = "common/motions.rs"]
-mod motions;
-
-use motions::{Case, case, compare};
+use crate::motions::{Case, case, compare};
 
 /// A body of every shape in flight, and a chain with two more bodies.
 macro_rules! shapes {

@@ -1,7 +1,6 @@
 //! A broken mesh is reported with the file, the place in it, what was found and what was expected.
 
-#[path = "common/refusal.rs"]
-mod refusal;
+use crate::refusal;
 
 #[test]
 fn mistakes_in_meshes_are_named() {

@@ -5,10 +5,9 @@
 //! of geoms to a rounding error. Vertices are the same single precision numbers but for the last bit. Hulls have the same
 //! corners and the same polygons.
 
-mod common;
-
-use common::compiled::differ;
-use common::oracle;
+use crate::common;
+use crate::common::compiled::differ;
+use crate::common::oracle;
 use marathon_physics::Model;
 use marathon_physics::mjcf::MjcfErrorKind;
 use marathon_physics::model::{Geom, GeomType, Hull};

@@ -6,10 +6,9 @@
 //! dm_control and Gymnasium, Marathon's own files of both, and one small model per feature of the format in
 //! `models/mjcf`. Colors and elevations are single precision in MuJoCo and agree to 1e-6.
 
-mod common;
-
-use common::compiled::differ;
-use common::{oracle, package, workspace};
+use crate::common;
+use crate::common::compiled::differ;
+use crate::common::{oracle, package, workspace};
 use marathon_physics::Model;
 use marathon_physics::mjcf::MjcfErrorKind;
 use marathon_physics::spec::{Actuator, Body, Geom, HField, Joint, Kind, ModelSpec};

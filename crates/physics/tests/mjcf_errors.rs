@@ -4,13 +4,10 @@
 //! row below is a model with one mistake, and the required parts of the message.
 
 #[cfg(unix)]
-mod common;
-#[path = "common/refusal.rs"]
-mod refusal;
-
+use crate::common;
+use crate::refusal::{self, check, in_body, message, with_section};
 use marathon_physics::Model;
 use marathon_physics::mjcf::MjcfErrorKind;
-use refusal::{check, in_body, message, with_section};
 
 #[test]
 fn misspelled_names_come_with_the_nearest_valid_one() {

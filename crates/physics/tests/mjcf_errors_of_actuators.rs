@@ -1,10 +1,7 @@
 //! A mistake in an actuator, a tendon or an equality constraint is reported with its place and the nearest valid choice.
 
-#[path = "common/refusal.rs"]
-mod refusal;
-
+use crate::refusal::{check, with_section};
 use marathon_physics::{Model, Sim, SimOptions};
-use refusal::{check, with_section};
 
 /// MuJoCo's rules for the paths of spatial tendons.
 #[test]

@@ -1,7 +1,6 @@
 //! A state that becomes non-finite is handled at its own agent: counted, reset, reported, without any effect on others.
 
-mod common;
-
+use crate::common;
 use marathon_physics::{Batch, BatchOptions, Isa, Model, SimOptions};
 use std::path::Path;
 

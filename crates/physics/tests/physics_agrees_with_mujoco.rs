@@ -7,9 +7,8 @@
 //! contacts between moving bodies and with terrain, elliptic cones, equality constraints, tendons, actuator dynamics,
 //! media and pushes.
 
-mod common;
-
-use common::numbers::{distance, largest, numbers};
+use crate::common;
+use crate::common::numbers::{distance, largest, numbers};
 use marathon_physics::lanes::Real;
 use marathon_physics::{Group, Isa, MeasurePlan, Model, Readings, Sim, SimOptions, Variation, Work, with_lanes};
 use serde::Deserialize;

@@ -14,15 +14,14 @@
 //!
 //! ```sh
 //! MARATHON_SEEDS=0..5000 MARATHON_OUT=/tmp/models \
-//!     cargo test --release -p marathon-physics --test random_models_agree_with_mujoco -- --nocapture
+//!     cargo test --release -p marathon-physics random_models_agree_with_mujoco:: -- --nocapture
 //! ```
 //!
 //! `MARATHON_SEEDS=17..18` runs one model again; `tests/oracle/random_models.py 17` prints it.
 
-mod common;
-
-use common::compiled::differ;
-use common::numbers::{distance, largest};
+use crate::common;
+use crate::common::compiled::differ;
+use crate::common::numbers::{distance, largest};
 use marathon_physics::lanes::Real;
 use marathon_physics::model::Sensor;
 use marathon_physics::{Group, MeasurePlan, Model, Readings, Sim, SimOptions, Work};

@@ -4,9 +4,8 @@
 //! other. Double precision agrees to 1e-8 of the sensor's size. Single precision agrees in every lane width to the
 //! rounding of its arithmetic.
 
-mod common;
-
-use common::numbers::{largest, numbers};
+use crate::common;
+use crate::common::numbers::{largest, numbers};
 use marathon_physics::lanes::Real;
 use marathon_physics::model::{Cone, SensorType};
 use marathon_physics::{Group, Isa, Model, Readings, Sim, SimOptions, Work, with_lanes};

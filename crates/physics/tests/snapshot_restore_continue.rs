@@ -1,7 +1,6 @@
 //! Contract: restoring a snapshot and continuing equals an uninterrupted simulation.
 
-mod common;
-
+use crate::common;
 use marathon_physics::{Batch, BatchOptions, Model, Variation};
 
 #[test]

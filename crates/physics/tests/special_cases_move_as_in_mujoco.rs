@@ -3,9 +3,8 @@
 //! Each model is stepped from its reference configuration under its own settings, in double precision on both sides.
 //! The states are compared every ten steps.
 
-mod common;
-
-use common::numbers::largest;
+use crate::common;
+use crate::common::numbers::largest;
 use marathon_physics::lanes::Isa;
 use marathon_physics::{Batch, BatchOptions, Model};
 use serde_json::{Value, json};

@@ -4,11 +4,7 @@
 //! and actuators with every integrator. Double precision follows MuJoCo's states, sensors and accelerations every ten
 //! steps. From MuJoCo's states, the other lane types find the same accelerations up to their rounding.
 
-mod common;
-#[path = "common/motions.rs"]
-mod motions;
-
-use motions::{Case, case, compare};
+use crate::motions::{Case, case, compare};
 
 /// Two arms on a turntable, and posts to tie them to.
 macro_rules! arms {

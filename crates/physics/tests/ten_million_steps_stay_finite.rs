@@ -4,8 +4,7 @@
 //!
 //! The variable MARATHON_TEST_LONG asks for all of it, as `tests/long.sh soak` does. Without it, a tenth is run.
 
-mod common;
-
+use crate::common;
 use marathon_physics::lanes::Isa;
 use marathon_physics::workload::{HOLD, Workload};
 use marathon_physics::{Model, SimOptions};

@@ -6,8 +6,7 @@
 //! From one call to the next, a batch remembers how far pairs of geoms are apart. That changes no bit: a new batch for every step ends
 //! with the same states and contacts.
 
-mod common;
-
+use crate::common;
 use marathon_physics::spec::{Kind, ModelSpec};
 use marathon_physics::workload::Uniform;
 use marathon_physics::{Batch, BatchOptions, Isa, Model};

@@ -6,10 +6,8 @@
 //! attribute of MuJoCo's schema, which the writer can emit. It may refuse one by name, but does not report it as a
 //! spelling mistake.
 
-mod common;
-
-use common::compiled::differ;
-use common::oracle;
+use crate::common::compiled::differ;
+use crate::common::oracle;
 use marathon_physics::Model;
 use marathon_physics::mjcf::MjcfErrorKind;
 use serde_json::{Value, json};

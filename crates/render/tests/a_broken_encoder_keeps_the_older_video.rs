@@ -1,12 +1,10 @@
 //! A video that cannot be written completely is an error, and the older video of that name stays. Causes are a full disk,
 //! or an encoder that reports success but writes no valid video.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::Folder;
+use crate::common::Folder;
 use marathon_render::{Image, Mp4Writer, Recorder, RenderError};
 
 /// A frame that encoders cannot compress well.

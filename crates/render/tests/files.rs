@@ -1,10 +1,9 @@
 //! Files hold the drawn pictures and appear completely or not at all. Failures name the file and the reason.
 
-mod common;
-
+use crate::common;
 use std::time::Duration;
 
-use common::{Folder, read_png};
+use crate::common::{Folder, read_png};
 use marathon_render::{
     Camera, Corner, Format, GifWriter, Image, Mp4Writer, Recorder, RenderError, Renderer, status_line, strip,
 };

@@ -1,7 +1,6 @@
 //! The following camera keeps a character in the picture without shaking and without lag.
 
-mod common;
-
+use crate::common;
 use marathon_render::{Follow, Scene};
 
 #[test]

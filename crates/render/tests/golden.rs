@@ -1,10 +1,9 @@
 //! A small scene with every shape looks as it did when a person last checked it.
 //!
-//! After a wanted change: `MARATHON_UPDATE_GOLDEN=1 cargo test -p marathon-render --test golden`, then look at
+//! After a wanted change: `MARATHON_UPDATE_GOLDEN=1 cargo test -p marathon-render golden::`, then look at
 //! `tests/golden/shapes.png` before committing it.
 
-mod common;
-
+use crate::common;
 use marathon_render::{Antialias, Camera, Corner, Renderer, Scene};
 
 const WIDTH: usize = 240;

@@ -1,7 +1,6 @@
 //! Geoms have MuJoCo's poses, at random configurations of Marathon's models and others.
 
-mod common;
-
+use crate::common;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};

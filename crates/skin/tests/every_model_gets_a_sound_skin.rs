@@ -1,9 +1,7 @@
 //! Every model of the repository gets a skin that is closed, has few triangles, normals that point outward, and weights that
 //! sum to one. The same model gives the same bytes.
 
-mod common;
-
-use common::models;
+use crate::common::models;
 use glam::DVec3;
 use marathon_skin::{MAX_TRIANGLES, Options, Skin, skin};
 use std::collections::{BTreeMap, BTreeSet};

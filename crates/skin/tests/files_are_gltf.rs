@@ -1,8 +1,6 @@
 //! The files are glTF 2.0 as a strict reader accepts it, with one skinned mesh and a joint for each body.
 
-mod common;
-
-use common::models;
+use crate::common::models;
 use marathon_skin::{Options, skin};
 
 #[test]

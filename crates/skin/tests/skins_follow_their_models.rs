@@ -1,9 +1,7 @@
 //! A skeleton of a skin is the model's own: its joints move exactly as the bodies do. Bending a joint bends the surface there,
 //! and leaves the far side of it in place.
 
-mod common;
-
-use common::models;
+use crate::common::models;
 use glam::{DQuat, DVec3};
 use marathon_motion::kinematics::Pose;
 use marathon_motion::{Bone, Mapping, Skeleton, SkeletonPoser};

@@ -5,6 +5,7 @@
 //! 3. A room imports only from rooms below it. So there is no ring of rooms that import each other.
 //! 4. Files do not import each other in circles, inside the rooms either.
 //! 5. The picture on the page shows the house of today.
+//! 6. The tests of a crate are one program, and no file is left out of it.
 
 use house::{Crate, House, Order, Step, picture};
 use std::collections::BTreeSet;
@@ -209,4 +210,26 @@ fn the_page_is_read_by_its_tables() {
         order.rooms.iter().map(|(n, s)| (n.as_str(), names(s))).collect::<Vec<_>>(),
         [("one", vec!["lanes: numbers".to_string()])]
     );
+}
+
+/// Names of the Rust files of a folder, without their ending.
+fn rust_files(folder: &Path) -> BTreeSet<String> {
+    let names = std::fs::read_dir(folder).into_iter().flatten().map(|entry| entry.expect("a file").file_name());
+    names.filter_map(|name| name.to_str()?.strip_suffix(".rs").map(str::to_owned)).collect()
+}
+
+#[test]
+fn no_test_is_left_out() {
+    for folder in std::fs::read_dir(root().join("crates")).expect("the crates").map(|e| e.expect("a folder").path()) {
+        let tests = folder.join("tests");
+        let Ok(program) = std::fs::read_to_string(tests.join("main.rs")) else { continue };
+        let manifest = std::fs::read_to_string(folder.join("Cargo.toml")).expect("the manifest");
+        let listed = |file: &String| {
+            file == "main"
+                || program.lines().any(|line| line == format!("mod {file};"))
+                || manifest.lines().any(|line| line == format!("name = \"{file}\""))
+        };
+        let left_out: Vec<_> = rust_files(&tests).into_iter().filter(|file| !listed(file)).collect();
+        assert_eq!(left_out, [""; 0], "in {}, but not in its main.rs", tests.display());
+    }
 }

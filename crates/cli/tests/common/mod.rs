@@ -1,7 +1,5 @@
 //! Runs the command in its own folder and reads the results.
 
-#![allow(dead_code, reason = "each test file uses a part of it")]
-
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -1,6 +1,4 @@
 //! Shared by the tests of this crate.
-#![allow(dead_code)]
-
 #[path = "../../../physics/tests/common/numbers.rs"]
 pub mod numbers;
 

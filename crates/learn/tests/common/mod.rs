@@ -1,7 +1,5 @@
 //! A task that is small enough to be learned within a test: hold a drifting puck at the origin of a plane.
 
-#![allow(dead_code, reason = "every test file uses a part")]
-
 pub mod numbers;
 #[path = "../../../physics/tests/common/oracle.rs"]
 mod oracle;

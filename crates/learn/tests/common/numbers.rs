@@ -1,7 +1,5 @@
 //! Numbers to test with, and finite differences.
 
-#![allow(dead_code, reason = "every test file uses a part")]
-
 /// 64-bit pseudorandom numbers: Knuth's generator, whose upper bits are good enough for test inputs.
 fn random(salt: u64) -> impl Iterator<Item = u64> {
     let mut state = salt.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;

@@ -1,7 +1,5 @@
 //! A task of two roles: a runner that stays at home, and an opponent that pushes it and skips decisions.
 
-#![allow(dead_code, reason = "each test file uses a part of it")]
-
 use marathon_envs::options::OptionSet;
 use marathon_envs::{Agent, Facts, Obs, OptionInfo, Options, Part, RoleFacts, Senses, Start, Terms, names, register};
 use marathon_physics::lanes::Real;

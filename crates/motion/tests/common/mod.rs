@@ -1,7 +1,5 @@
 //! Helpers shared by the tests.
 
-#![allow(dead_code)]
-
 pub mod bvh;
 #[path = "../../../physics/tests/common/oracle.rs"]
 mod oracle;

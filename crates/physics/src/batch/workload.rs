@@ -9,7 +9,6 @@ use crate::lanes::{Isa, Real};
 use crate::model::{JointType, Model};
 use crate::sim::{Sim, SimError, SimOptions};
 use crate::state::{Group, SolverStats, Work};
-use crate::with_lanes;
 
 /// Steps for which a control is held.
 pub const HOLD: usize = 4;
@@ -52,7 +51,7 @@ impl Workload {
     /// # Errors
     /// If the model cannot be simulated.
     pub fn run(&self, model: &Model, clock: &dyn Fn() -> f64) -> Result<Report, SimError> {
-        with_lanes!(self.isa, T => self.run_lanes::<T>(model, clock))
+        with_kernels!(self.isa, T => self.run_lanes::<T>(model, clock))
     }
 
     fn run_lanes<T: Real>(&self, model: &Model, clock: &dyn Fn() -> f64) -> Result<Report, SimError> {

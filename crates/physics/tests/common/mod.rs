@@ -1,6 +1,6 @@
 //! Runs the oracle scripts from tests, and compares their results.
 
-#[allow(dead_code)]
+#[allow(dead_code, reason = "the unit tests of shapes use a part")]
 pub mod compiled;
 pub mod numbers;
 mod oracle;
@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 /// Every shipped model file: those of Marathon's agents, and Marathon's own files of Gymnasium's and dm_control's
 /// tasks.
-#[allow(dead_code)]
+#[allow(dead_code, reason = "the unit tests of shapes use a part")]
 pub fn shipped() -> Vec<PathBuf> {
     let mut paths: Vec<PathBuf> = ["agents", "gymnasium", "dm_control"]
         .iter()

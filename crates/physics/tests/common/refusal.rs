@@ -1,6 +1,4 @@
 //! Models that are refused, and the message.
-#![allow(dead_code, reason = "every test file uses a part")]
-
 use marathon_physics::Model;
 
 /// Checks that a model with files is refused by a message with these parts.

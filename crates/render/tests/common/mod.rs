@@ -1,7 +1,5 @@
 //! Helpers shared by the tests.
 
-#![allow(dead_code)]
-
 use std::path::{Path, PathBuf};
 
 use marathon_physics::Model;

@@ -1,0 +1,7 @@
+//! What the crate promises, a file for each promise. One program, so that the kernels are compiled once.
+
+mod a_held_backflip_goes_before_speed;
+mod clips_go_with_their_task;
+mod command_tracking_is_measured;
+mod options_are_refused_by_name;
+mod policies_learn_from_policies;
