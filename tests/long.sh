@@ -9,12 +9,13 @@
 #   web       the page in Chromium and Firefox, with five minutes of play
 #   soak      ten million steps of each agent, three hundred models with random meshes
 #   crates    packs and compiles the published crates
+#   avian     the example that lets characters touch the bodies of another physics engine
 #   player    twenty random players in the game, and four with a camera in each of five worlds, ten minutes of its time each
 set -euo pipefail
 cd "$(dirname "$0")/.."
 parts=("$@")
 if [ $# = 0 ]; then
-  parts=(fuzz release aarch64 suites bits web soak crates player)
+  parts=(fuzz release aarch64 suites bits web soak crates avian player)
 fi
 for part in "${parts[@]}"; do
   echo "tests/long.sh: $part" >&2
@@ -43,10 +44,11 @@ for part in "${parts[@]}"; do
         ten_million_steps_stay_finite:: meshes_agree_with_mujoco::
       ;;
     crates) release/publish.sh --dry-run ;;
+    avian) cargo test --release --workspace --bin avian_props ;;
     player)
       cargo test --release --workspace --test contracts -- --ignored --nocapture a_stranger_plays::
       MARATHON_TEST_LONG=yes cargo test --release --workspace --test contracts -- --nocapture the_camera_stays_outside::
       ;;
-    *) echo "tests/long.sh: no part '$part'; there are fuzz, release, aarch64, suites, bits, web, soak, crates and player" >&2 && exit 2 ;;
+    *) echo "tests/long.sh: no part '$part'; there are fuzz, release, aarch64, suites, bits, web, soak, crates, avian and player" >&2 && exit 2 ;;
   esac
 done

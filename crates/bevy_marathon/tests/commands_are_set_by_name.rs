@@ -1,10 +1,11 @@
 //! An app commands a character by the names of its task's numbers. A wrong name or value is refused and changes nothing. The rover of
 //! `examples/rover.rs` takes a velocity.
 
+#[allow(dead_code, reason = "a part of it is enough")]
+mod common;
 #[path = "../../../examples/rover.rs"]
 mod rover;
 
-use crate::common;
 use bevy::prelude::*;
 use bevy_marathon::prelude::*;
 use std::sync::{Arc, LazyLock};

@@ -9,7 +9,6 @@ mod characters_fall_get_up_and_feel_blows;
 mod characters_feel_solids;
 mod characters_go_where_they_are_sent;
 mod clips_and_physics_take_turns;
-mod commands_are_set_by_name;
 mod every_system;
 mod feet_stand_on_screen;
 mod inspectors_and_scenes_know_the_components;

@@ -6,9 +6,8 @@
 //! - After a fall, the character gets up. The episode ends instead if the getting-up clips are excluded or the episode
 //!   is mortal.
 
-mod common;
-
-use common::{begun, options};
+use crate::common;
+use crate::common::{begun, options};
 use marathon_envs::{Step, VecEnv, factory, registry};
 use marathon_physics::lanes::Isa;
 use std::f64::consts::FRAC_PI_2;
@@ -366,4 +365,26 @@ fn a_clip_without_a_skill_is_refused() {
     let error = registry::factory_with(ID, &options(&[("clip", "walk,backflap")]), Isa::best()).err().unwrap();
     let text = error.to_string();
     assert!(text.contains("'backflap'") && text.contains("did you mean 'backflip'?"), "{text}");
+}
+
+/// Observations of a quarter of a second, in which nobody falls.
+fn seen(list: &[(&str, &str)]) -> Vec<f32> {
+    let (mut env, mut step) = made(list);
+    let mut all = Vec::new();
+    for _ in 0..10 {
+        go(&mut env, &mut step);
+        all.extend_from_slice(&step.obs);
+    }
+    all
+}
+
+/// `gait_max_target` bounds the servos where the gait leads them, and leaves the skills alone.
+#[test]
+fn the_gait_may_have_servos_of_a_smaller_range() {
+    let walking = |option: &str, limit: &str| seen(&[("clip", "walk,stand"), ("start", "random"), (option, limit)]);
+    assert_eq!(walking("gait_max_target", "0.3"), walking("max_target", "0.3"));
+    assert_ne!(walking("gait_max_target", "0.3"), walking("gait_max_target", "3"));
+    let rising = |option: &str, limit: &str| seen(&[("clip", "getup_faceup"), ("start", "first"), (option, limit)]);
+    assert_eq!(rising("gait_max_target", "0.3"), rising("gait_max_target", "3"));
+    assert_ne!(rising("max_target", "0.3"), rising("max_target", "3"));
 }

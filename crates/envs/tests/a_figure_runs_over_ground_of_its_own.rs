@@ -81,7 +81,11 @@ fn height(ground: &[f32], x: f64, y: f64) -> f64 {
 
 /// Size of a figure's observation of the ground, without the heights of its feet.
 fn seen(id: &str) -> usize {
-    if in_space(id) { 45 } else { 26 }
+    match id {
+        "TerrainMarathonMan-v0" => 45 + 51,
+        _ if in_space(id) => 45,
+        _ => 26,
+    }
 }
 
 #[test]
@@ -136,9 +140,12 @@ fn a_figure_sees_the_ground_that_it_has() {
                 // nine rows ahead, with five points from left to right in each
                 let [c, d, _] = axis(&model, &state, eyes);
                 let [c, d] = [c / c.hypot(d), d / c.hypot(d)];
-                for k in 0..45 {
-                    let (ahead, left) = (0.4 * f64::from(k / 5) - 0.4, 0.6 - 0.3 * f64::from(k % 5));
+                let mut see = |ahead: f64, left: f64| {
                     expected.push(clipped(height(ground, x + ahead * c - left * d, y + ahead * d + left * c)));
+                };
+                (0..45).for_each(|k| see(0.4 * f64::from(k / 5) - 0.4, 0.6 - 0.3 * f64::from(k % 5)));
+                if seen(id) > 45 {
+                    (0..51).for_each(|k| see(0.1 * f64::from(k / 3), 0.2 - 0.2 * f64::from(k % 3)));
                 }
             } else {
                 expected.extend((0..25).map(|k| clipped(height(ground, x - 2.0 + 0.2 * f64::from(k), 0.0))));

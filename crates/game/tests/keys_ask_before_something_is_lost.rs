@@ -91,7 +91,7 @@ fn a_policy_that_learns_and_a_recording_are_not_lost() -> Result<(), Box<dyn Err
     frames(&mut app, 2);
     assert!(file("hopper-live-2.safetensors").exists());
 
-    let mut app = crate::app(&["walker"]);
+    let mut app = self::app(&["walker"]);
     press(&mut app, KeyCode::KeyR);
     frames(&mut app, 30);
     press(&mut app, KeyCode::KeyQ);

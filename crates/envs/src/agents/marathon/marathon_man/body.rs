@@ -9,7 +9,6 @@ use marathon_physics::spec::{Actuator, Kind, ModelSpec};
 
 use super::super::imitation::Anatomy;
 use crate::agent::options::Choice;
-use crate::agent::senses::clamp;
 use crate::agent::{ModelSource, Part, Scale};
 
 /// The model with motors.
@@ -159,17 +158,12 @@ impl Choice for Control {
 }
 
 /// Sets the targets of the servos: each action offsets the next pose of its joint by up to `action_scale`. A target is an angle of at
-/// most `max_target`, both rad.
+/// most `limit`, both rad.
 #[inline(always)]
-pub fn set_targets<T: Real>(
-    ctrl: &mut [T],
-    action: &[T],
-    [action_scale, max_target]: [Scale; 2],
-    poses: [T; JOINTS.len()],
-) {
+pub fn set_targets<T: Real>(ctrl: &mut [T], action: &[T], action_scale: Scale, limit: T, poses: [T; JOINTS.len()]) {
     for (i, joint) in ACTIONS.into_iter().enumerate() {
         let target = action[i].mul_add(T::lit(action_scale.0), poses[joint]);
-        ctrl[i] = clamp(target, -max_target.0, max_target.0);
+        ctrl[i] = target.max(-limit).min(limit);
     }
 }
 

@@ -89,6 +89,8 @@ crate::options! {
         action_scale: Scale = Scale(1.0),
         /// Largest angle of a servo's target, rad. With 1, it cannot bend a hip or a knee by more than about 60 degrees.
         max_target: Scale = Scale(3.0),
+        /// The same outside skills, where the gait sets the targets, rad. Above `max_target` it has no effect.
+        gait_max_target: Scale = Scale(3.0),
         /// Start of an episode: `random` decisions of the clips and skills, `first` (standing), or `adaptive` (as in
         /// the steered task).
         start: StartAt = StartAt::Random,
@@ -272,8 +274,9 @@ impl Agent for Controller {
             let of_clip = clip.qvel(FIRST_QVEL + joint).mul_add(T::lit(DAMPING_TIME), clip.qpos(FIRST_QPOS + joint));
             *target = T::select(on, of_clip, gait(joint));
         }
-        let ControllerArguments { action_scale, max_target, .. } = self.arguments;
-        set_targets(c.ctrl, c.action, [action_scale, max_target], targets);
+        let ControllerArguments { action_scale, max_target, gait_max_target, .. } = self.arguments;
+        let of_gait = max_target.0.min(gait_max_target.0);
+        set_targets(c.ctrl, c.action, action_scale, T::select(on, T::lit(max_target.0), T::lit(of_gait)), targets);
     }
 
     #[inline(always)]

@@ -27,6 +27,7 @@ impl Runner for Steer {
     const TERMS: &'static [&'static str] = &TERMS;
     const MEMORY: usize = START_ROW + 1;
     const IN_SPACE: bool = true;
+    const LOOKS_CLOSER: bool = true;
     const BODY: &'static [&'static str] = &OBSERVED;
     const MOTORS: usize = ACTIONS.len();
     const JOINT: &'static str = JOINTS[0].name;

@@ -227,7 +227,7 @@ impl Agent for MarathonMan {
                 let poses = std::array::from_fn(|joint| {
                     clip.qvel(FIRST_QVEL + joint).mul_add(T::lit(DAMPING_TIME), clip.qpos(FIRST_QPOS + joint))
                 });
-                set_targets(c.ctrl, c.action, [action_scale, max_target], poses);
+                set_targets(c.ctrl, c.action, action_scale, T::lit(max_target.0), poses);
             }
         }
     }

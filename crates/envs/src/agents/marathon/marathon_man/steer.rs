@@ -354,7 +354,7 @@ impl Agent for Steer {
                 let SteerArguments { action_scale, max_target, .. } = self.arguments;
                 // compensate the servo's damping, which would slow the gait
                 let next = Self::next_pose(|slot| c.memory[slot], PACE_LIMITS, c.dt, DAMPING_TIME);
-                set_targets(c.ctrl, c.action, [action_scale, max_target], std::array::from_fn(next));
+                set_targets(c.ctrl, c.action, action_scale, T::lit(max_target.0), std::array::from_fn(next));
             }
         }
     }

@@ -8,6 +8,7 @@
 //! | what the figure's own task observes | but for the heights of its feet |
 //! | `foot_heights` | height of each foot's center above the ground below it, m |
 //! | `ground_ahead` | with `heights`: how far the ground is above the Hopper's foot or the Walker's torso, at 25 points every 0.2 m from 2 m behind it on, m; in space above the torso, at 45 points around and ahead of it |
+//! | `ground_close` | with `heights`, for Marathon Man: the same at 51 points where the next two steps lead, every 0.1 m |
 //! | `phase` | with `heights`, in a plane: share of the present 0.2 m that lies behind, 0 to 1 |
 //!
 //! `full`: r = v/4 + forward bonus - effort - 4 (joints at limit) - pain, of the torso; experiment 004 of the original.
@@ -62,6 +63,16 @@ const GRID: [[f64; 2]; 45] = {
         i += 1;
     }
     grid
+};
+/// Places where a figure with long feet puts them in the next two steps, as fine as the ground itself. Between two points of
+/// the grid, an edge is hidden.
+const CLOSE: [[f64; 2]; 51] = {
+    let (mut close, mut i) = ([[0.0; 2]; 51], 0);
+    while i < close.len() {
+        close[i] = [0.1 * (i / 3) as f64, 0.2 - 0.2 * (i % 3) as f64];
+        i += 1;
+    }
+    close
 };
 /// Farthest below or above the figure that ground is seen, m.
 const SIGHT: f64 = 3.0;
@@ -226,6 +237,12 @@ impl<F: Runner> Terrain<F> {
             for point in GRID {
                 out.scalar(clipped(s.ground_near(F::EYES, point)));
             }
+            if F::LOOKS_CLOSER {
+                out.group("ground_close");
+                for point in CLOSE {
+                    out.scalar(clipped(s.ground_near(F::EYES, point)));
+                }
+            }
             return;
         }
         for i in 0..SEEN {
@@ -270,10 +287,11 @@ impl<F: Runner> Agent for Terrain<F> {
             if fall_penalty.take().is_some() {
                 terms.push("fall".into());
             }
-            let ahead: &[&str] = match (self.arguments.heights, F::IN_SPACE) {
-                (true, false) => &["ground_ahead", "phase"],
-                (true, true) => &["ground_ahead"],
-                (false, _) => &[],
+            let ahead: &[&str] = match (self.arguments.heights, F::IN_SPACE, F::LOOKS_CLOSER) {
+                (true, false, _) => &["ground_ahead", "phase"],
+                (true, true, false) => &["ground_ahead"],
+                (true, true, true) => &["ground_ahead", "ground_close"],
+                (false, ..) => &[],
             };
             let seen = [F::BODY, &["foot_heights"], ahead].concat();
             let others = self.others();

@@ -36,6 +36,8 @@ pub trait Runner: Agent + Clone + Default {
     const MEMORY: usize = 0;
     /// Whether the figure moves in space. It then also observes the ground to its sides.
     const IN_SPACE: bool = false;
+    /// Whether a figure in space also observes the ground of its next two steps more finely.
+    const LOOKS_CLOSER: bool = false;
     /// Groups of the observation of the body.
     const BODY: &'static [&'static str];
     /// Number of motors. Those of other roles follow.
