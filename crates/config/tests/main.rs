@@ -1,4 +1,4 @@
-//! What the crate promises, a file for each promise. One program, so that the kernels are compiled once.
+//! One program for all integration tests of the crate, so that the kernels are compiled once. A file has one promise.
 
 mod common;
 

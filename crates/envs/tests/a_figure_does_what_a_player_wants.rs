@@ -367,7 +367,7 @@ fn a_clip_without_a_skill_is_refused() {
     assert!(text.contains("'backflap'") && text.contains("did you mean 'backflip'?"), "{text}");
 }
 
-/// Observations of a quarter of a second, in which nobody falls.
+/// Observations of a quarter of a second, too short for a fall.
 fn seen(list: &[(&str, &str)]) -> Vec<f32> {
     let (mut env, mut step) = made(list);
     let mut all = Vec::new();
