@@ -41,7 +41,7 @@ fi
 # lints and checks documentation while it compiles
 export RUSTC_WORKSPACE_WRAPPER="$PWD/tests/lint.sh"
 cargo build --release "${packages[@]}" "${all_targets[@]}"
-cargo test --release "${packages[@]}" --lib --bins --tests
+cargo test --release "${packages[@]}" --tests
 cargo test --release "${packages[@]}" --doc
 # ML-Agents waits for its trainers most of the time, and so is tested beside the Python package
 mlagents=$(mktemp)
