@@ -1,7 +1,6 @@
 //! The systems of the plugin, one by one, in an app without a window.
 
-use crate::common;
-use crate::common::{Log, app, policy, run_until};
+use crate::common::{self, Log, app, policy, run_until};
 use bevy::prelude::*;
 use bevy_marathon::axes::to_game;
 use bevy_marathon::prelude::*;

@@ -1,7 +1,6 @@
 //! `marathon serve` streams agents to pages that know the token, and slow pages do not hold it up.
 
-use crate::common;
-use crate::common::{json, marathon};
+use crate::common::{self, json, marathon};
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;

@@ -1,7 +1,6 @@
 //! Every error names the item and the place, the valid values, and the nearest valid choice.
 
-use crate::common;
-use crate::common::{SMALL, fail, json, run, succeed};
+use crate::common::{self, SMALL, fail, json, run, succeed};
 
 #[track_caller]
 fn says(text: &str, parts: &[&str]) {

@@ -4,8 +4,7 @@
 //! - `doctor` reports the computer, and shells complete commands.
 //! - The help of the game needs no game, and a misspelled task gets few names.
 
-use crate::common;
-use crate::common::{SMALL, fail, json, marathon, run, succeed};
+use crate::common::{self, SMALL, fail, json, marathon, run, succeed};
 
 #[test]
 fn training_ends_with_a_video() {

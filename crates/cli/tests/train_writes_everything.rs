@@ -1,7 +1,6 @@
 //! A run writes all documented files, and they agree with each other.
 
-use crate::common;
-use crate::common::{SMALL, assert_no_leftovers, event_files, json, read_json, run, stderr, succeed, tensors};
+use crate::common::{self, SMALL, assert_no_leftovers, event_files, json, read_json, run, stderr, succeed, tensors};
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;

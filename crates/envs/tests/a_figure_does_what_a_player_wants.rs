@@ -6,8 +6,7 @@
 //! - After a fall, the character gets up. The episode ends instead if the getting-up clips are excluded or the episode
 //!   is mortal.
 
-use crate::common;
-use crate::common::{begun, options};
+use crate::common::{self, begun, options};
 use marathon_envs::{Step, VecEnv, factory, registry};
 use marathon_physics::lanes::Isa;
 use std::f64::consts::FRAC_PI_2;

@@ -1,7 +1,6 @@
 //! Requirements for every registered agent: dm_control's suite checks and Marathon's own.
 
-use crate::common;
-use crate::common::{go_on, make, own_agents, play};
+use crate::common::{self, go_on, make, own_agents, play};
 use marathon_envs::{Autoreset, ResetNoise, Step, TERMINATION_TERM, VecEnv, VecEnvOptions};
 
 /// Observation length, action length, decisions per second, decisions per episode: the paper's numbers.

@@ -14,6 +14,7 @@ mod agents_are_found_by_name;
 mod agents_beyond_the_budget_are_refused;
 mod agents_can_differ;
 mod agents_follow_motion_clips;
+mod an_adversary_builds_the_ground;
 mod an_agent_does_what_it_is_told;
 mod an_agent_of_ones_own;
 mod an_agent_sees_its_own_ground;

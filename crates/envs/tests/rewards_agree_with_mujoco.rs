@@ -5,8 +5,7 @@
 //! Python. Agents with commands, and agents on courses, have their own tests:
 //! `a_figure_in_a_plane_is_told_how_fast_to_go` and `a_figure_runs_over_ground_of_its_own`.
 
-use crate::common;
-use crate::common::{action, make, oracle};
+use crate::common::{self, action, make, oracle};
 use marathon_envs::Autoreset;
 use marathon_physics::lanes::Isa;
 use serde_json::json;

@@ -1,8 +1,7 @@
 //! Assault courses in the game: a policy runs, a player leads a runner, or builds the ground ahead of one by mouse and
 //! keys. Finished runs enter the table of the longest runs, and their replays match them bit for bit, ground included.
 
-use crate::windowless;
-use crate::windowless::frames;
+use crate::windowless::{self, frames};
 use bevy::input::ButtonState;
 use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::input::mouse::{MouseButtonInput, MouseScrollUnit, MouseWheel};

@@ -1,7 +1,6 @@
 //! A gamepad does what keys do: raw events, as its driver sends them, become actions. No pad, no window needed.
 
-use crate::devices;
-use crate::devices::{key, pull};
+use crate::devices::{self, key, pull};
 use bevy::input::gamepad::GamepadButton;
 use bevy::input::{ButtonState, InputPlugin};
 use bevy::prelude::*;

@@ -6,8 +6,7 @@
 mod steer;
 
 use crate::devices::{key, pad, press, pull, push};
-use crate::windowless;
-use crate::windowless::frames;
+use crate::windowless::{self, frames};
 use bevy::input::ButtonState;
 use bevy::input::gamepad::{GamepadAxis, GamepadButton};
 use bevy::prelude::*;

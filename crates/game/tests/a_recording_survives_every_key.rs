@@ -1,7 +1,6 @@
 //! A recording made with R is kept, whatever happens: other keys, other characters, the end of the game.
 
-use crate::windowless;
-use crate::windowless::frames;
+use crate::windowless::{self, frames};
 use clap::ValueEnum;
 use marathon_game::app::{Action, Recording, TrainingRun};
 use std::error::Error;

@@ -2,8 +2,7 @@
 //! screen shows no error, and nothing of the former mode is left.
 
 use crate::devices;
-use crate::windowless;
-use crate::windowless::frames;
+use crate::windowless::{self, frames};
 use bevy::input::ButtonState;
 use bevy::prelude::*;
 use bevy_marathon::prelude::*;

@@ -2,8 +2,7 @@
 //! effects.
 
 use crate::devices;
-use crate::windowless;
-use crate::windowless::frames;
+use crate::windowless::{self, frames};
 use bevy::input::ButtonState;
 use bevy::prelude::*;
 use marathon_game::app::{

@@ -1,7 +1,6 @@
 //! Settings are kept in one readable file; a bad file is renamed and reported. All screens fit windows of every size.
 
-use crate::windowless;
-use crate::windowless::frames;
+use crate::windowless::{self, frames};
 use bevy::prelude::*;
 use bevy::window::WindowResolution;
 use bevy_egui::{EguiContext, PrimaryEguiContext, egui};

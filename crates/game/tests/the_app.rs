@@ -1,7 +1,6 @@
 //! The systems of the app, driven by its keys, without a window and without drawing.
 
-use crate::windowless;
-use crate::windowless::frames;
+use crate::windowless::{self, frames};
 use bevy::input::ButtonState;
 use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::prelude::*;

@@ -1,7 +1,6 @@
 //! The player drags a limb, makes a character limp, and keeps the last seconds as a film. Steps, balls and falls are heard.
 
-use crate::windowless;
-use crate::windowless::frames;
+use crate::windowless::{self, frames};
 use bevy::input::ButtonState;
 use bevy::input::mouse::MouseButtonInput;
 use bevy::prelude::*;

@@ -1,7 +1,6 @@
 //! The trainer learns: it solves a task with drift, limits and unscaled observations within seconds.
 
-use crate::common;
-use crate::common::{PuckTask, learning_config, ppo};
+use crate::common::{self, PuckTask, learning_config, ppo};
 use marathon_learn::{
     A2c, Acktr, Activation, Algorithm, Control, IterationStats, LrSchedule, Sac, Schedule, Snapshot, TrainConfig,
     evaluate, train,

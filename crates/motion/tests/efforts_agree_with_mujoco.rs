@@ -1,8 +1,7 @@
 //! Inverse dynamics equals MuJoCo's `mj_inverse` without contacts, and so do momentum and center of mass. A character
 //! thrown into the air flies freely, and the ground carries one that stands.
 
-use crate::common;
-use crate::common::{model, oracle, rows, shipped, waves};
+use crate::common::{self, model, oracle, rows, shipped, waves};
 use marathon_motion::dynamics::{Motion, inverse};
 use marathon_motion::{About, Clip, Cycle, Layout, contacts, efforts, soles};
 use marathon_physics::Model;

@@ -1,4 +1,6 @@
 //! Shared by the tests of this crate.
+
+pub mod courses;
 #[path = "../../../physics/tests/common/numbers.rs"]
 pub mod numbers;
 
@@ -9,7 +11,6 @@ use marathon_envs::{AgentState, Autoreset, Options, Step, VecEnv, VecEnvOptions}
 use marathon_motion::kinematics::Pose;
 use marathon_physics::Model;
 use marathon_physics::lanes::Isa;
-#[allow(unused_imports, reason = "every test file uses a part")]
 pub use oracle::{oracle, package, scratch};
 
 /// The suite's own agents, whose rewards end with a termination term.

@@ -3,6 +3,7 @@
 
 use marathon_physics::lanes::Real;
 
+use super::super::terrain::sight::{self, Sight};
 use super::super::terrain::{Runner, Terrain};
 use super::body::{ACTIONS, BUTT, FEET, JOINTS};
 use super::steer::{DIRECTION, HOLDS, MAX_SPEED, OBSERVED, START_ROW, Steer, TERMS};
@@ -26,8 +27,7 @@ impl Runner for Steer {
     const FALL: f64 = -20.0;
     const TERMS: &'static [&'static str] = &TERMS;
     const MEMORY: usize = START_ROW + 1;
-    const IN_SPACE: bool = true;
-    const LOOKS_CLOSER: bool = true;
+    const SIGHTS: &'static [Sight] = &[sight::AHEAD, sight::CLOSE];
     const BODY: &'static [&'static str] = &OBSERVED;
     const MOTORS: usize = ACTIONS.len();
     const JOINT: &'static str = JOINTS[0].name;

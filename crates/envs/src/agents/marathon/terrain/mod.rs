@@ -29,6 +29,7 @@ mod plan;
 mod profile;
 mod regret;
 mod runners;
+pub mod sight;
 
 pub use arguments::TerrainArguments;
 pub use runners::Runner;
@@ -55,25 +56,6 @@ use profile::{FROM, POINTS, TO};
 const SEEN: usize = 25;
 const SPACING: f64 = 0.2;
 const BEHIND: f64 = 2.0;
-/// The same for a figure in space: places ahead of it and to its left, m, from left to right, the farthest row last.
-const GRID: [[f64; 2]; 45] = {
-    let (mut grid, mut i) = ([[0.0; 2]; 45], 0);
-    while i < grid.len() {
-        grid[i] = [0.4 * (i / 5) as f64 - 0.4, 0.6 - 0.3 * (i % 5) as f64];
-        i += 1;
-    }
-    grid
-};
-/// Places where a figure with long feet puts them in the next two steps, as fine as the ground itself. Between two points of
-/// the grid, an edge is hidden.
-const CLOSE: [[f64; 2]; 51] = {
-    let (mut close, mut i) = ([[0.0; 2]; 51], 0);
-    while i < close.len() {
-        close[i] = [0.1 * (i / 3) as f64, 0.2 - 0.2 * (i % 3) as f64];
-        i += 1;
-    }
-    close
-};
 /// Farthest below or above the figure that ground is seen, m.
 const SIGHT: f64 = 3.0;
 
@@ -232,19 +214,16 @@ impl<F: Runner> Terrain<F> {
     fn observe_ahead<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
         let [x, y, z] = s.position(F::EYES);
         let clipped = |ground: T| (ground - z).max(T::lit(-SIGHT)).min(T::lit(SIGHT));
-        out.group("ground_ahead");
+        for (group, places) in F::SIGHTS {
+            out.group(group);
+            for place in *places {
+                out.scalar(clipped(s.ground_near(F::EYES, *place)));
+            }
+        }
         if F::IN_SPACE {
-            for point in GRID {
-                out.scalar(clipped(s.ground_near(F::EYES, point)));
-            }
-            if F::LOOKS_CLOSER {
-                out.group("ground_close");
-                for point in CLOSE {
-                    out.scalar(clipped(s.ground_near(F::EYES, point)));
-                }
-            }
             return;
         }
+        out.group("ground_ahead");
         for i in 0..SEEN {
             out.scalar(clipped(s.ground_height(x + T::lit(i as f64 * SPACING - BEHIND), y)));
         }
@@ -287,13 +266,12 @@ impl<F: Runner> Agent for Terrain<F> {
             if fall_penalty.take().is_some() {
                 terms.push("fall".into());
             }
-            let ahead: &[&str] = match (self.arguments.heights, F::IN_SPACE, F::LOOKS_CLOSER) {
-                (true, false, _) => &["ground_ahead", "phase"],
-                (true, true, false) => &["ground_ahead"],
-                (true, true, true) => &["ground_ahead", "ground_close"],
-                (false, ..) => &[],
+            let ahead = match (self.arguments.heights, F::IN_SPACE) {
+                (true, false) => vec!["ground_ahead", "phase"],
+                (true, true) => F::SIGHTS.iter().map(|(group, _)| *group).collect(),
+                (false, _) => Vec::new(),
             };
-            let seen = [F::BODY, &["foot_heights"], ahead].concat();
+            let seen = [F::BODY, &["foot_heights"], &ahead].concat();
             let others = self.others();
             roles = builder::roles([&actions, &others], &seen, &terms, self.regrets());
             actions.extend(others);

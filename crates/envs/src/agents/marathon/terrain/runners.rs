@@ -5,6 +5,7 @@ use marathon_physics::lanes::Real;
 use super::super::ant::{self, AntV0};
 use super::super::hopper::{self, FOOT, HopperV0};
 use super::super::walker2d::{self, LEFT_FOOT, RIGHT_FOOT, Walker2dV0};
+use super::sight::{self, Sight};
 use crate::agent::{Agent, Obs, Part, ResetNoise, Senses, Start, Terms};
 use crate::episode_rng::EpisodeRng;
 
@@ -34,10 +35,10 @@ pub trait Runner: Agent + Clone + Default {
     const TERMS: &'static [&'static str] = &["velocity", "uprightness", "effort", "joints_at_limit"];
     /// Number of the figure's own memory slots, which come first.
     const MEMORY: usize = 0;
-    /// Whether the figure moves in space. It then also observes the ground to its sides.
-    const IN_SPACE: bool = false;
-    /// Whether a figure in space also observes the ground of its next two steps more finely.
-    const LOOKS_CLOSER: bool = false;
+    /// Where a figure in space sees the ground. One in a plane sees it along its line.
+    const SIGHTS: &'static [Sight] = &[];
+    /// Whether the figure moves in space.
+    const IN_SPACE: bool = !Self::SIGHTS.is_empty();
     /// Groups of the observation of the body.
     const BODY: &'static [&'static str];
     /// Number of motors. Those of other roles follow.
@@ -122,7 +123,7 @@ impl Runner for AntV0 {
     const JOINT: &'static str = "hip_1";
     // it may leave its line
     const HALF_WIDTH: f64 = 8.0;
-    const IN_SPACE: bool = true;
+    const SIGHTS: &'static [Sight] = &[sight::AHEAD];
 
     #[inline(always)]
     fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
