@@ -173,6 +173,26 @@ fn motions_too_short_to_loop_are_refused() {
 }
 
 #[test]
+fn a_loop_is_found_in_a_recording() {
+    let temp = tempfile::tempdir().unwrap();
+    // stands for a moment, then bends and straightens three times, 38 frames each
+    let mut document: serde_json::Value = serde_json::from_str(&recording()).unwrap();
+    document["Loop"] = "none".into();
+    let bend = document["Frames"].as_array().unwrap().clone();
+    let there_and_back = bend.iter().chain(bend.iter().rev().skip(1));
+    let still = std::iter::repeat_n(&bend[0], 8);
+    document["Frames"] = still.chain((0..3).flat_map(|_| there_and_back.clone().skip(1))).cloned().collect();
+    std::fs::write(temp.path().join("bends.txt"), document.to_string()).unwrap();
+    let import = ["motion", "import", "bends.txt", "--model", "humanoid", "--trim", "0.1", "10", "--loop", "find"];
+    let text = succeed(temp.path(), &[&import[..], &["--out", "bends.motion"]].concat());
+    let times = text.split("note: loops from ").nth(1).and_then(|rest| rest.split(" s of the recording").next());
+    let times: Vec<f64> = times.expect("a note").split(" to ").map(|time| time.parse().unwrap()).collect();
+    assert!(times[0] >= 0.1 && (times[1] - times[0] - 38.0 * 0.0333).abs() < 0.002, "{text}");
+    let file = std::fs::read_to_string(temp.path().join("bends.motion")).unwrap();
+    assert!(file.contains("\"loop\": \"wrap\""));
+}
+
+#[test]
 fn a_loop_whose_ends_differ_is_refused() {
     let temp = tempfile::tempdir().unwrap();
     // the hips sink by half a meter

@@ -10,7 +10,8 @@ use marathon_physics::hint::nearest;
 use marathon_physics::lanes::Isa;
 
 use crate::agent::bindings::Blueprint;
-use crate::agent::{Agent, Facts, ModelSource, OptionInfo, Options};
+use crate::agent::options::Value;
+use crate::agent::{Agent, Clips, Facts, ModelSource, OptionInfo, Options};
 use crate::error::EnvError;
 use crate::lanes::AgentFactory;
 use crate::shard::AgentShards;
@@ -37,6 +38,10 @@ pub trait AnyAgent: Send + Sync {
     /// Whether there is an argument with this name.
     fn has_option(&self, name: &str) -> bool {
         self.options().iter().any(|known| known.name == name)
+    }
+    /// Whether there is an argument with this name that takes motion clips.
+    fn takes_clips(&self, name: &str) -> bool {
+        self.options().iter().any(|known| known.name == name && known.takes(&Value::Clips(Clips::default())))
     }
     /// The agent with other values of some arguments.
     ///

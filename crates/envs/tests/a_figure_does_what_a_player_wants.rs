@@ -7,9 +7,10 @@
 //!   is mortal.
 
 use crate::common::{self, begun, options};
+use marathon_envs::agents::marathon::marathon_man::gait::{Footwork, gaits};
 use marathon_envs::{Step, VecEnv, factory, registry};
 use marathon_physics::lanes::Isa;
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 const ID: &str = "MarathonManController-v0";
 const AGENTS: usize = 16;
@@ -17,6 +18,8 @@ const AGENTS: usize = 16;
 const JUMP: usize = 39;
 /// Most decisions of the backflip, which waits up to 80 of them for the clip's first pose.
 const BACKFLIP: usize = 80 + 66;
+/// The hinges that swing the legs sideways, right and left.
+const HIPS_X: [usize; 2] = [4, 10];
 /// Size of the command.
 const COMMAND: usize = 5;
 /// Size of `info`, and its slots of the active skill and of getting up.
@@ -59,6 +62,39 @@ fn the_steered_observation_comes_first() {
     let names: Vec<&str> = own.command.iter().map(|range| range.name.as_str()).collect();
     assert_eq!(names, ["speed", "left", "turn", "jump", "backflip"]);
     assert_eq!(own.command.iter().filter(|range| range.is_button()).count(), 2);
+}
+
+/// In a step to a side, the hips swing the feet so that the standing one keeps its place.
+#[test]
+fn side_steps_swing_the_hips() {
+    // slow enough that the gait has no share of the run, whose hips swing, too
+    for left in [0.4, -0.4] {
+        let (mut env, mut step) = made(&[("start", "first")]);
+        tell(&mut env, [0.0, left, 0.0, 0.0, 0.0]);
+        let (gait, target, next) = (part(&env, "gait").start, target_of(&env), part(&env, "next_pose").start);
+        let (angles, n, dt) = (part(&env, "joint_positions").start, env.spec().obs, env.spec().dt);
+        let mut largest = 0.0f64;
+        for _ in 0..30 {
+            go(&mut env, &mut step);
+            for agent in (0..AGENTS).filter(|agent| told(&step, *agent, RISING) == 0.0).collect::<Vec<_>>() {
+                let at = |i: usize| f64::from(step.obs[agent * n + i]);
+                let (pace, aside) = (at(gait), at(target + 1));
+                // short, quick steps
+                let cadence = pace.max(at(target).hypot(aside)).max(2.5 * aside.abs());
+                let phase = at(gait + 2).atan2(at(gait + 1)) / TAU + gaits().frequency(cadence) * dt;
+                let angle = |aside, hinge| {
+                    let footwork = Footwork::new(0.0, aside, 0.0, gaits().frequency(cadence));
+                    gaits().angle(&gaits().moment(phase, pace, footwork, 0.0), hinge)
+                };
+                for hinge in HIPS_X {
+                    let (got, expected) = (at(next + hinge) + at(angles + hinge), angle(aside, hinge));
+                    assert!((got - expected).abs() < 1e-3, "{left}: {got} rad, expected {expected}");
+                    largest = largest.max((expected - angle(0.0, hinge)).abs());
+                }
+            }
+        }
+        assert!(largest > 0.05, "{largest} rad");
+    }
 }
 
 /// Every command to move, however slow, has a gait that lifts the feet. A stop command has none.

@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use crate::common::{action, isas, make};
 use marathon_envs::agents::marathon::marathon_man::clips;
-use marathon_envs::agents::marathon::marathon_man::gait::gaits;
+use marathon_envs::agents::marathon::marathon_man::gait::{Footwork, gaits};
 use marathon_envs::agents::marathon::marathon_man::steer::{MAX_HEADING_LAG, STYLE};
 use marathon_envs::{AgentState, Autoreset, Demonstrations, VecEnv, VecEnvOptions, agent, factory};
 use marathon_motion::dynamics::Motion;
@@ -158,8 +158,12 @@ fn the_gait_follows_the_command_and_stays_near_the_body_speed() {
                 faster += 1;
             }
             // the next pose minus the present one
-            let next =
-                gaits().moment(next_sin.atan2(next_cos) / TAU + gaits().frequency(next_pace) * dt, next_pace, 0.0);
+            let next = gaits().moment(
+                next_sin.atan2(next_cos) / TAU + gaits().frequency(next_pace) * dt,
+                next_pace,
+                Footwork::straight(),
+                0.0,
+            );
             for joint in 0..21 {
                 let (got, expected) = (is[NEXT + joint], gaits().angle(&next, joint) - is[ANGLES + joint]);
                 assert!((got - expected).abs() < 1e-4, "joint {joint}: {got}, expected {expected}");
@@ -234,7 +238,9 @@ fn the_commanded_direction_turns_as_told_and_rewards_are_their_formula() {
             let off = |v: [f64; 2]| (velocity[0] - v[0]).hypot(velocity[1] - v[1]);
             assert!((off(told) - off_command).abs() < 1e-4, "{} {off_command}", off(told));
             let e = off(*target).powi(2);
-            let gait = |lead: f64| gaits().moment(is[GAIT + 2].atan2(is[GAIT + 1]) / TAU, is[GAIT], lead);
+            let gait = |lead: f64| {
+                gaits().moment(is[GAIT + 2].atan2(is[GAIT + 1]) / TAU, is[GAIT], Footwork::straight(), lead)
+            };
             let (mut apart, mut faster, mut total) = (0.0, 0.0, 0.0);
             for (joint, weight) in weights().into_iter().enumerate() {
                 let [now, led] = [0.0, 1e-6].map(|lead| gaits().angle(&gait(lead), joint));

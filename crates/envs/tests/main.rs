@@ -8,6 +8,7 @@ mod a_figure_does_what_a_player_wants;
 mod a_figure_goes_where_it_is_told;
 mod a_figure_in_a_plane_is_told_how_fast_to_go;
 mod a_figure_runs_over_ground_of_its_own;
+mod a_gait_comes_from_clips_of_ones_own;
 mod a_gymnasium_return_agrees_with_gymnasium;
 mod a_sparse_reward_is_paid_once;
 mod agents_are_found_by_name;

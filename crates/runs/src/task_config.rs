@@ -89,8 +89,8 @@ impl TaskConfig {
     pub fn with(mut self, options: &TaskOptions) -> Result<Self, RunError> {
         let agent = registry::agent(&self.agent)?;
         for (name, value) in &options.given {
-            let value = match name == CLIP && agent.has_option(CLIP) {
-                true => clips::read_all(value, self.options.get(CLIP), &self.agent, &agent.model()?)?,
+            let value = match agent.takes_clips(name) {
+                true => clips::read_all(value, self.options.get(name), &self.agent, &agent.model()?)?,
                 false => value.clone(),
             };
             self.options.set(name, value);

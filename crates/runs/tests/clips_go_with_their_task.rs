@@ -52,6 +52,29 @@ fn a_run_folder_and_a_policy_hold_clips_that_were_given_in_memory() {
     );
 }
 
+/// Every option that takes clips takes files, not `clip` alone.
+#[test]
+fn the_clips_of_a_gait_are_files_too() {
+    let temp = tempfile::tempdir().unwrap();
+    let file = temp.path().join("amble.motion");
+    std::fs::write(&file, shipped("walk").unwrap().to_bytes()).unwrap();
+    let with = |name: &str, value: String| {
+        let given = vec![(name.to_string(), Value::Text(value))];
+        TaskConfig::named("MarathonManController").unwrap().with(&TaskOptions { given })
+    };
+    let task = with("walk", file.display().to_string()).unwrap();
+    assert_eq!(task.options.given_clips()["amble.motion"], &shipped("walk").unwrap());
+    let path = temp.path().join("run");
+    let run = RunFile::new(&task, &marathon_config::default_for("MarathonManController"));
+    RunFolder::create(Some(&path), "MarathonManController").unwrap().begin(&run).unwrap();
+    let (folder, run) = RunFolder::open(&path).unwrap();
+    assert_eq!(run.options.get("walk"), Some(&Value::Text("amble.motion".into())));
+    assert_eq!(folder.task_config(&run).unwrap(), task);
+    let missing = temp.path().join("ambel.motion").display().to_string();
+    let error = with("run", missing).unwrap_err().to_string();
+    assert!(error.contains("ambel.motion") && error.contains("did you mean"), "{error}");
+}
+
 #[test]
 fn policies_with_clips_of_one_name_teach_one_policy() {
     let temp = tempfile::tempdir().unwrap();

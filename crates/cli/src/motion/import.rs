@@ -140,10 +140,16 @@ fn write(
     if let Some(&[from, to]) = edits.trim.as_deref() {
         recording = recording.trim(path, from, to)?;
     }
+    if edits.looping == Looping::Find {
+        let [from, to] = recording.best_loop(path)?;
+        recording = recording.trim(path, from, to)?;
+        let before = edits.trim.as_deref().map_or(0.0, |trim| trim[0]);
+        notes.push(format!("loops from {:.3} to {:.3} s of the recording", before + from, before + to));
+    }
     let mut animation = animation.with_clip(recording);
     let wraps = match edits.looping {
         Looping::Auto => animation.wraps() && edits.trim.is_none(),
-        Looping::Wrap => true,
+        Looping::Wrap | Looping::Find => true,
         Looping::None => false,
     };
     if wraps && animation.cycle().is_none() {
@@ -156,9 +162,10 @@ fn write(
                 seam.joints.to_degrees()
             )
         };
-        if seam.gapes() && edits.looping == Looping::Wrap {
+        if seam.gapes() && edits.looping != Looping::Auto {
+            let how = if edits.looping == Looping::Find { "find" } else { "wrap" };
             return Err(CliError::Usage(format!(
-                "--loop wrap: {}: {}, expected two similar poses; --trim FROM TO selects them",
+                "--loop {how}: {}: {}, expected two similar poses; --trim FROM TO selects them",
                 path_word(path),
                 differ()
             )));

@@ -50,6 +50,8 @@ pub enum Looping {
     Auto,
     /// Loops: the last pose repeats the first, farther on.
     Wrap,
+    /// Loops: the part of 0.3 to 4 s whose ends are most alike.
+    Find,
     /// Ends.
     None,
 }

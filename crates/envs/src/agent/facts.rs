@@ -314,7 +314,7 @@ impl Motors {
 }
 
 /// Index of a name, at compile time.
-const fn find(list: &[&str], name: &str) -> usize {
+pub(crate) const fn find(list: &[&str], name: &str) -> usize {
     let mut i = 0;
     while i < list.len() {
         if same(list[i].as_bytes(), name.as_bytes()) {

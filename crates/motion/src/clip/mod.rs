@@ -2,6 +2,7 @@
 
 mod edit;
 mod file;
+mod loops;
 mod sample;
 
 use crate::error::MotionError;

@@ -9,7 +9,7 @@ use marathon_physics::spec::{Actuator, Kind, ModelSpec};
 
 use super::super::imitation::Anatomy;
 use crate::agent::options::Choice;
-use crate::agent::{ModelSource, Part, Scale};
+use crate::agent::{ModelSource, Part, Scale, find};
 
 /// The model with motors.
 const MODEL: &str = marathon_assets::text("agents/marathon_man.xml");
@@ -106,6 +106,22 @@ pub const JOINTS: [Joint; 21] = [
     joint("left_shoulder_x", 0.3, 730.0, 180.0, 20.0),
     joint("left_elbow", 0.2, 550.0, 110.0, 40.0),
 ];
+
+/// Index of a hinge in [`JOINTS`]. In a `const`, an unknown name is a compile error.
+pub const fn hinge(name: &str) -> usize {
+    find(&NAMES, name)
+}
+
+/// Names of the joints.
+const NAMES: [&str; JOINTS.len()] = {
+    let (mut names, mut i) = ([""; JOINTS.len()], 0);
+    while i < JOINTS.len() {
+        names[i] = JOINTS[i].name;
+        i += 1;
+    }
+    names
+};
+
 /// The data that the reward needs.
 pub const ANATOMY: Anatomy = Anatomy {
     root: BUTT,

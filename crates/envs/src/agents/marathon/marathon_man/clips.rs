@@ -99,12 +99,14 @@ pub fn check(option: &Clips, known: &[&str], allow_given: bool) -> Result<(), St
     }
     let is_known = |clip: &&NamedClip| known.contains(&clip.name()) || (allow_given && clip.clip().is_some());
     match option.iter().find(|clip| !is_known(clip)) {
-        Some(missing) if !is_all(option) => {
-            let (name, hint) = (missing.name(), among(missing.name(), known));
-            Err(format!("option clip is '{name}', expected a clip that is known{hint}"))
-        }
+        Some(missing) if !is_all(option) => Err(unknown("clip", missing.name(), known)),
         _ => Ok(()),
     }
+}
+
+/// The error that an option names a clip that is not among the known ones.
+pub fn unknown(option: &str, name: &str, known: &[&str]) -> String {
+    format!("option {option} is '{name}', expected a clip that is known{}", among(name, known))
 }
 
 #[cfg(test)]

@@ -31,8 +31,8 @@ use super::body::{
 use super::clips::{self, ALL};
 use super::skills::{BACKFLIP, FROM_A_STAND, JUMP, RISEN, SKILLS, SLOTS, Skills, carriage};
 use super::steer::{
-    CLIPS, Commands, DIRECTION, MAX_SPEED, MAX_TURN, OBSERVATION, PACE, PaceLimits, START_ROW, Steer, SteerArguments,
-    TARGET, TERMS,
+    CLIPS, Commands, DIRECTION, FOOTWORK_SLOTS, MAX_SPEED, MAX_TURN, OBSERVATION, PACE, PaceLimits, START_ROW, Steer,
+    SteerArguments, TARGET, TERMS,
 };
 use super::{FRAME_SKIP, SECONDS, decisions};
 use crate::agent::senses::{clamp, hypot};
@@ -44,16 +44,17 @@ use crate::episode_rng::EpisodeRng;
 
 /// Highest commanded speed to a side, m/s.
 const ASIDE: f64 = 0.8;
-/// Rates and limits of the reference signals. They are higher than in the steered task, except for deceleration down: a run
+/// Rates and limits of the reference signals. They are higher than in the steered task, except for slowing down: a run
 /// that ends abruptly makes the character fall.
 const PACE_LIMITS: PaceLimits = PaceLimits {
-    acceleration: 5.0,
-    deceleration: 3.0,
+    acceleration: 7.0,
+    deceleration: 4.0,
     overshoot: 0.5,
     max_lead: 1.2,
     quick_steps: true,
     turn_radius: 0.6,
     min_pace: 0.8,
+    footwork: Some(FOOTWORK),
 };
 /// How far ahead the clip is observed, decisions.
 const AHEAD: usize = 4;
@@ -61,8 +62,10 @@ const AHEAD: usize = 4;
 const SKILL: Skills = Skills { slot: START_ROW + 1 };
 /// Slot that holds whether a fall ends the episode.
 const ENDS_ON_FALL: usize = SKILL.slot + SLOTS;
+/// Slots of the gait's footwork.
+const FOOTWORK: usize = ENDS_ON_FALL + 1;
 /// Number of slots without those of [replayed falls](super::super::fall_replay).
-const MEMORY: usize = ENDS_ON_FALL + 1;
+const MEMORY: usize = FOOTWORK + FOOTWORK_SLOTS;
 /// Fraction of the episodes that start within a skill.
 const SKILLED: f64 = 0.45;
 /// Mean distance of the parts from the clip that ends an episode without locomotion, m.
@@ -78,7 +81,14 @@ const RISE: f64 = 0.3;
 /// Fractions of the commands that are jumps, backflips and side steps.
 const JUMPING: f64 = 0.15;
 const FLIPPING: f64 = 0.12;
-const STEPPING: f64 = 0.15;
+const STEPPING: f64 = 0.2;
+/// Shortest duration of a `sharp` side step, decisions.
+const SHORTEST_STEP: usize = 16;
+/// Fraction of the `sharp` commands that are keys of a keyboard, and the shortest and longest duration of one, decisions.
+const KEYS: f64 = 0.25;
+const KEY_HOLDS: [usize; 2] = [8, 48];
+/// Fraction of these commands in which a button is pressed.
+const PRESSED: f64 = 0.2;
 /// Smallest and largest velocity change by the push at the start of an episode, m/s.
 const PUSH_SPEED: [f64; 2] = [2.0, 5.0];
 
@@ -110,6 +120,10 @@ crate::options! {
         /// Fraction of the locomotion episodes that start 0.75 to 1.5 s before the last fall, once there is one (0 to
         /// 1).
         replay_falls_prob: Share = Share(0.0),
+        /// Looping clip that the gait at a walk is made from.
+        walk: Clips = Clips::named("walk"),
+        /// The same at a run.
+        run: Clips = Clips::named("run"),
     }
 }
 
@@ -154,7 +168,8 @@ impl Controller {
         let all = clips::is_all(&arguments.clip);
         let named = |name: &str| all || arguments.clip.iter().any(|clip| clip.name() == name);
         let does = Does { gait: CLIPS.into_iter().any(named), skills: SKILLS.map(|skill| named(skill.clip)) };
-        let ControllerArguments { action_scale, max_target, start, commands, replay_falls_prob, .. } = arguments;
+        let ControllerArguments { action_scale, max_target, start, commands, replay_falls_prob, walk, run, .. } =
+            arguments.clone();
         let steer = Steer::of(
             SteerArguments {
                 action_scale,
@@ -162,8 +177,11 @@ impl Controller {
                 start,
                 commands,
                 replay_falls_prob,
+                walk,
+                run,
                 ..SteerArguments::default()
             },
+            PACE_LIMITS,
             MEMORY,
         );
         Controller { arguments, does, steer }
@@ -213,7 +231,7 @@ impl Agent for Controller {
 
     fn fits(&self, model: &Model) -> Result<(), String> {
         clips::check(&self.arguments.clip, &known_clips(), false)?;
-        super::has_joints(model)
+        self.steer.fits(model)
     }
 
     fn reset(&self, start: &mut Start) {
@@ -246,6 +264,17 @@ impl Agent for Controller {
     }
 
     fn command(&self, random: &mut EpisodeRng, step: usize, out: &mut [f64]) -> usize {
+        if self.arguments.commands == Commands::Sharp && random.uniform(0.0, 1.0) < KEYS {
+            // any key may be down while another one is
+            let axes = [[0.0, 0.0, MAX_SPEED], [-ASIDE, 0.0, ASIDE], [-MAX_TURN, 0.0, MAX_TURN]];
+            let [speed, left, turn] = axes.map(|values| values[random.whole(0, 2)]);
+            let [jump, backflip] = [JUMP, BACKFLIP].map(|skill| {
+                let pressed = random.uniform(0.0, 1.0) < PRESSED;
+                f64::from(u8::from(pressed && self.does.skills[skill]))
+            });
+            out.copy_from_slice(&[speed, left, turn, jump, backflip]);
+            return random.whole(KEY_HOLDS[0], KEY_HOLDS[1]);
+        }
         let mut going = [0.0; 2];
         let mut hold = self.steer.command(random, step, &mut going);
         let (mut left, mut jump, mut backflip) = (0.0, 0.0, 0.0);
@@ -255,11 +284,17 @@ impl Agent for Controller {
         } else if (JUMPING..JUMPING + FLIPPING).contains(&kind) && self.does.skills[BACKFLIP] {
             (going, backflip, hold) = ([0.0; 2], 1.0, random.whole(40, 120));
         } else if (JUMPING + FLIPPING..JUMPING + FLIPPING + STEPPING).contains(&kind) {
-            (going, left) = ([random.uniform(0.0, 0.8), 0.0], random.around_zero(ASIDE));
-            // players mostly step straight to a side
-            if self.arguments.commands == Commands::Sharp && random.whole(0, 1) == 0 {
-                going[0] = 0.0;
+            // a player holds a side step on the spot, against a turn, or while running
+            left = random.around_zero(ASIDE);
+            let [goes, turns] = [0, 1].map(|_| random.whole(0, 1) == 0);
+            going = [random.uniform(0.0, MAX_SPEED), random.around_zero(MAX_TURN)];
+            if self.arguments.commands == Commands::Sharp {
+                // most keys are pressed fully or not at all, and not for long
+                [left, going[0], going[1]] = [(left, ASIDE), (going[0], MAX_SPEED), (going[1], MAX_TURN)]
+                    .map(|(x, most): (f64, f64)| if random.whole(0, 2) > 0 { most.copysign(x) } else { x });
+                hold = random.whole(SHORTEST_STEP, hold);
             }
+            going = [if goes { going[0] } else { 0.0 }, if turns { going[1] } else { 0.0 }];
         }
         out.copy_from_slice(&[going[0], left, going[1], jump, backflip]);
         hold
@@ -268,7 +303,7 @@ impl Agent for Controller {
     #[inline(always)]
     fn ctrl<T: Real>(&self, c: &mut Ctrl<T>) {
         let (on, clip) = (SKILL.on(c.memory), c.reference(1));
-        let gait = Steer::next_pose(|slot| c.memory[slot], PACE_LIMITS, c.dt, DAMPING_TIME);
+        let gait = self.steer.guide.next_pose(|slot| c.memory[slot], c.dt, DAMPING_TIME);
         let mut targets = [T::zero(); JOINTS.len()];
         for (joint, target) in targets.iter_mut().enumerate() {
             let of_clip = clip.qvel(FIRST_QVEL + joint).mul_add(T::lit(DAMPING_TIME), clip.qpos(FIRST_QPOS + joint));
@@ -287,13 +322,14 @@ impl Agent for Controller {
         for (i, x) in SKILL.facing(s, memory).into_iter().enumerate() {
             memory[DIRECTION + i] = x;
         }
+        memory[FOOTWORK] = T::lit(1.0);
     }
 
     #[inline(always)]
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
         let [speed, left, turn, jump, backflip] = told(s);
         let before = [DIRECTION, DIRECTION + 1].map(|slot| memory[slot]);
-        Steer::lead(s, memory, [speed, left], turn, PACE_LIMITS);
+        self.steer.guide.lead(s, memory, [speed, left], turn);
         let rose = SKILL.rises(memory);
         let was_on = SKILL.remember(s, memory, [jump, backflip]);
         let on = SKILL.on(memory);
@@ -322,7 +358,7 @@ impl Agent for Controller {
         let (turned, next, r) = (turned_to(facing), s.reference(1), s.readings());
         let pose = |i, of_gait| T::select(on, next.qpos(FIRST_QPOS + i), of_gait);
         let [speed, left, turn, jump, backflip] = told(s);
-        Steer::observe_going(s, facing, [speed, turn], pose, PACE_LIMITS, out);
+        self.steer.guide.observe_going(s, facing, [speed, turn], pose, out);
         out.group("phase");
         for x in s.reference(0).phase_angles() {
             out.scalar(T::masked(on, x));
@@ -364,7 +400,7 @@ impl Agent for Controller {
         // a jump may land elsewhere than the clip; rewarding `drift` in a turn taught turning on one point, and falling
         let moves = T::or(gait, jumps);
         let straight = turn.abs().lt(T::lit(0.01));
-        Steer::add_terms(s, [moves, T::and(moves, straight), gait], moved, terms);
+        self.steer.guide.add_terms(s, [moves, T::and(moves, straight), gait], moved, terms);
         let [similar, posture] = imitation::similarity(s, &ANATOMY);
         terms.add("skill", 1.0, SKILL.worth(&all) * T::select(jumps, posture, similar));
         // the pose of a small hop scores almost like a jump, so reward height

@@ -34,8 +34,8 @@ impl Runner for Steer {
     const HALF_WIDTH: f64 = 8.0;
 
     #[inline(always)]
-    fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
-        Steer::observe_along(s, out);
+    fn observe_body<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        self.guide.observe_along(s, out);
     }
 
     // start from the clips as in the steered task, but at the beginning of the course, facing along it
@@ -62,7 +62,7 @@ impl Runner for Steer {
     }
 
     #[inline(always)]
-    fn add_terms<T: Real>(s: &Senses<T>, whole: T, _: [T; 2], terms: &mut Terms<T>) {
-        Steer::add_terms(s, [T::lit(0.5).lt(whole); 3], Steer::told(s), terms);
+    fn add_terms<T: Real>(&self, s: &Senses<T>, whole: T, _: [T; 2], terms: &mut Terms<T>) {
+        self.guide.add_terms(s, [T::lit(0.5).lt(whole); 3], Steer::told(s), terms);
     }
 }

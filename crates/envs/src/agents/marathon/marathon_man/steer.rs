@@ -37,7 +37,8 @@
 mod signals;
 
 use std::f64::consts::{FRAC_PI_2, TAU};
-use std::sync::LazyLock;
+use std::path::Path;
+use std::sync::{Arc, LazyLock};
 
 use marathon_physics::Model;
 use marathon_physics::lanes::Real;
@@ -51,13 +52,13 @@ use super::body::{
     set_targets,
 };
 use super::clips::{self, STAND};
-use super::gait::{beginning, gaits};
+use super::gait::{Footwork, Gaits, beginning, gaits};
 use super::{DECISION, FRAME_SKIP, SECONDS, decisions, observe_soles};
 use crate::agent::options::Choice;
 use crate::agent::senses::{clamp, hypot};
 use crate::agent::{
-    Agent, CommandRange, Ctrl, Facts, Following, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale, Seconds,
-    Senses, Share, Start, Terms, names,
+    Agent, Clips, CommandRange, Ctrl, Facts, Following, Obs, OptionInfo, OptionSet, Options, ResetNoise, Scale,
+    Seconds, Senses, Share, Start, Terms, names,
 };
 use crate::episode_rng::EpisodeRng;
 
@@ -126,6 +127,7 @@ const PACE_LIMITS: PaceLimits = PaceLimits {
     quick_steps: false,
     turn_radius: 0.4,
     min_pace: 0.0,
+    footwork: None,
 };
 /// The deceleration limit applies when the command is slower than the target by more than this, m/s. Turning changes
 /// the target velocity too.
@@ -142,6 +144,13 @@ const STILLNESS_SCALES: [f64; 2] = [0.1, 0.01];
 const MAX_OVERSHOOT: f64 = 0.5;
 /// Smallest command that is overshot, m/s.
 const MIN_OVERSHOT_COMMAND: f64 = 0.05;
+/// Slots of a gait's footwork: stride, velocity to the left, m/s, and turn rate, rad/s.
+pub(super) const FOOTWORK_SLOTS: usize = 3;
+/// Cadence of a step to a side, as the speed of a walk, per velocity to the side. Short, quick steps keep the feet from
+/// crossing.
+const CADENCE_ASIDE: f64 = 2.5;
+/// Largest change rate of the turn that the gait shows, rad/s^2.
+const MAX_TWIST_RATE: f64 = 8.0;
 /// Upper limit of the least pace, as a multiple of the commanded velocity. The least pace fades out with small
 /// commands.
 const MIN_PACE_PER_COMMAND: f64 = 4.0;
@@ -151,7 +160,7 @@ const MIN_PACE_PER_COMMAND: f64 = 4.0;
 pub(super) struct PaceLimits {
     /// Largest rate of change of the target velocity and the pace, m/s^2.
     pub acceleration: f64,
-    /// The same while deceleration down, m/s^2.
+    /// The same while slowing down, m/s^2.
     pub deceleration: f64,
     /// Overshoot of the target beyond a command to move, as a fraction of the velocity error. It is at most [`MAX_OVERSHOOT`],
     /// and the target never exceeds [`MAX_SPEED`]. Without it, the body gets close to a command quickly and takes as long
@@ -168,14 +177,32 @@ pub(super) struct PaceLimits {
     /// Least pace under a command to move or turn, m/s. A slower gait hardly lifts the feet, and the character
     /// stumbles.
     pub min_pace: f64,
+    /// First slot of the gait's [footwork](Footwork), `FOOTWORK_SLOTS` of them. Without it, all gaits lead straight on.
+    pub footwork: Option<usize>,
 }
 
-impl PaceLimits {
+/// Reference signals of a commanded character.
+#[derive(Clone, Debug)]
+pub(super) struct Guide {
+    pub limits: PaceLimits,
+    pub gaits: Arc<Gaits>,
+}
+
+impl Guide {
     /// The speed whose step frequency the gait uses, m/s.
     #[inline(always)]
-    pub fn cadence<T: Real>(self, memory: impl Fn(usize) -> T) -> T {
-        let pace = memory(PACE);
-        if self.quick_steps { pace.max(hypot(memory(TARGET), memory(TARGET + 1))) } else { pace }
+    pub fn cadence<T: Real>(&self, memory: impl Fn(usize) -> T) -> T {
+        let (limits, pace) = (self.limits, memory(PACE));
+        let pace = if limits.quick_steps { pace.max(hypot(memory(TARGET), memory(TARGET + 1))) } else { pace };
+        limits.footwork.map_or(pace, |slot| pace.max(memory(slot + 1).abs() * T::lit(CADENCE_ASIDE)))
+    }
+
+    /// The gait's footwork.
+    #[inline(always)]
+    pub fn footwork<T: Real>(&self, memory: impl Fn(usize) -> T) -> Footwork<T> {
+        let Some(slot) = self.limits.footwork else { return Footwork::straight() };
+        let [stride, left, turn] = [0, 1, 2].map(|i| memory(slot + i));
+        Footwork::new(stride, left, turn, self.gaits.frequency(self.cadence(memory)))
     }
 }
 
@@ -217,6 +244,10 @@ crate::options! {
         replay_falls_prob: Share = Share(0.0),
         /// Longest episode, s. With shorter episodes, more of them follow a fall.
         seconds: Seconds = Seconds(SECONDS),
+        /// Looping clip that the gait at a walk is made from.
+        walk: Clips = Clips::named("walk"),
+        /// The same at a run.
+        run: Clips = Clips::named("run"),
     }
 }
 
@@ -243,18 +274,25 @@ fn fitting_clip(command: &[f64]) -> usize {
 #[derive(Clone, Debug)]
 pub struct Steer {
     pub(super) arguments: SteerArguments,
+    pub(super) guide: Guide,
+    /// Why the arguments' clips are no gaits, if so.
+    pub(super) unfit: Option<String>,
     pub(super) fall_replay: FallReplay,
 }
 
 impl Default for Steer {
     fn default() -> Self {
-        Self::of(SteerArguments::default(), START_ROW + 1)
+        Self::of(SteerArguments::default(), PACE_LIMITS, START_ROW + 1)
     }
 }
 
 impl Steer {
     /// `relived`: the first memory slot of the replayed falls.
-    pub(super) fn of(arguments: SteerArguments, relived: usize) -> Self {
+    pub(super) fn of(arguments: SteerArguments, limits: PaceLimits, relived: usize) -> Self {
+        let (gaits, unfit) = match Self::gaits(&arguments) {
+            Ok(gaits) => (gaits, None),
+            Err(error) => (gaits().clone(), Some(error)),
+        };
         let fall_replay = FallReplay {
             slot: relived,
             share: arguments.replay_falls_prob.0,
@@ -262,7 +300,24 @@ impl Steer {
             places: 2,
             also: Some(PHASE),
         };
-        Steer { arguments, fall_replay }
+        Steer { arguments, guide: Guide { limits, gaits }, unfit, fall_replay }
+    }
+
+    /// The gaits of the arguments' clips.
+    fn gaits(arguments: &SteerArguments) -> Result<Arc<Gaits>, String> {
+        let ours = SteerArguments::default();
+        if (&arguments.walk, &arguments.run) == (&ours.walk, &ours.run) {
+            return Ok(gaits().clone());
+        }
+        let [walk, run] = [("walk", &arguments.walk), ("run", &arguments.run)].map(|(option, clips)| {
+            let found = clips::find(clips);
+            match (&found[..], clips.iter().count()) {
+                ([clip], 1) => Ok(clip.clone()),
+                ([], 1) => Err(clips::unknown(option, &clips.to_string(), &clips::names())),
+                (_, count) => Err(format!("option {option} has {count} clips, expected one")),
+            }
+        });
+        Ok(Gaits::of(&*walk?, &*run?)?.into())
     }
 }
 
@@ -298,11 +353,17 @@ impl Agent for Steer {
     }
 
     fn with_options(&self, options: &Options) -> Option<Self> {
-        Some(Self::of(self.arguments.with(options), self.fall_replay.slot))
+        Some(Self::of(self.arguments.with(options), self.guide.limits, self.fall_replay.slot))
     }
 
     fn fits(&self, model: &Model) -> Result<(), String> {
-        super::has_joints(model)
+        for clip in clips::find(&self.arguments.walk).into_iter().chain(clips::find(&self.arguments.run)) {
+            clip.check_model(Path::new(&clip.about().name), model).map_err(|error| error.to_string())?;
+        }
+        match &self.unfit {
+            Some(error) => Err(error.clone()),
+            None => super::has_joints(model),
+        }
     }
 
     fn reset(&self, start: &mut Start) {
@@ -353,7 +414,7 @@ impl Agent for Steer {
             Control::Pd => {
                 let SteerArguments { action_scale, max_target, .. } = self.arguments;
                 // compensate the servo's damping, which would slow the gait
-                let next = Self::next_pose(|slot| c.memory[slot], PACE_LIMITS, c.dt, DAMPING_TIME);
+                let next = self.guide.next_pose(|slot| c.memory[slot], c.dt, DAMPING_TIME);
                 set_targets(c.ctrl, c.action, action_scale, T::lit(max_target.0), std::array::from_fn(next));
             }
         }
@@ -369,7 +430,7 @@ impl Agent for Steer {
 
     #[inline(always)]
     fn remember<T: Real>(&self, s: &Senses<T>, memory: &mut [T]) {
-        Self::lead(s, memory, [s.command(0), T::zero()], s.command(1), PACE_LIMITS);
+        self.guide.lead(s, memory, [s.command(0), T::zero()], s.command(1));
         self.fall_replay.remember(s, memory, |_| {
             let felled = on_the_ground(s);
             [T::not(felled), felled]
@@ -378,12 +439,12 @@ impl Agent for Steer {
 
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
-        Self::observe_along(s, out);
+        self.guide.observe_along(s, out);
     }
 
     #[inline(always)]
     fn step_reward<T: Real>(&self, s: &Senses<T>, terms: &mut Terms<T>) {
-        Self::add_terms(s, [T::not(T::none()); 3], Self::told(s), terms);
+        self.guide.add_terms(s, [T::not(T::none()); 3], Self::told(s), terms);
     }
 
     #[inline(always)]

@@ -393,7 +393,7 @@ impl<F: Runner> Agent for Terrain<F> {
 
     #[inline(always)]
     fn observe<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
-        F::observe_body(s, out);
+        self.figure.observe_body(s, out);
         out.group("foot_heights");
         for foot in F::SOLES {
             let [x, y, z] = s.position(*foot);
@@ -411,7 +411,7 @@ impl<F: Runner> Agent for Terrain<F> {
         let memory = Self::course(s);
         match self.arguments.reward {
             Reward::Full => {
-                F::add_terms(s, T::lit(1.0) - memory[HURT], self.hard(s), terms);
+                self.figure.add_terms(s, T::lit(1.0) - memory[HURT], self.hard(s), terms);
                 terms.add("pain", PAIN, memory[HIT]);
                 if self.built() {
                     terms.add("fall", F::FALL, T::masked(self.failed(memory), T::lit(1.0)));

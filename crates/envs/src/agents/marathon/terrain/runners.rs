@@ -48,7 +48,7 @@ pub trait Runner: Agent + Clone + Default {
     /// Half the width of the courses, m. Neighboring tracks of figures in a plane must not overlap in a picture.
     const HALF_WIDTH: f64;
     /// Writes the observation of the body.
-    fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>);
+    fn observe_body<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>);
 
     /// Sets the start state.
     fn place(&self, start: &mut Start) {
@@ -67,7 +67,7 @@ pub trait Runner: Agent + Clone + Default {
     /// Adds the figure's terms of the reward `full`. `whole` is 1, or 0 after a fall. `hard` holds the effort and the
     /// penalty for motors at their limits.
     #[inline(always)]
-    fn add_terms<T: Real>(s: &Senses<T>, whole: T, hard: [T; 2], terms: &mut Terms<T>) {
+    fn add_terms<T: Real>(&self, s: &Senses<T>, whole: T, hard: [T; 2], terms: &mut Terms<T>) {
         terms.add("velocity", 1.0, s.velocity(Self::TORSO));
         terms.add("uprightness", 1.0, whole * s.forward_bonus(Self::TORSO));
         terms.add("effort", Self::EFFORT, whole * hard[0]);
@@ -88,7 +88,7 @@ impl Runner for HopperV0 {
     const HALF_WIDTH: f64 = 0.4;
 
     #[inline(always)]
-    fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
+    fn observe_body<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
         hopper::observe_body(s, out);
     }
 }
@@ -106,8 +106,8 @@ impl Runner for Walker2dV0 {
     const HALF_WIDTH: f64 = 0.4;
 
     #[inline(always)]
-    fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
-        Walker2dV0.observe(s, out);
+    fn observe_body<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        self.observe(s, out);
     }
 }
 
@@ -126,7 +126,7 @@ impl Runner for AntV0 {
     const SIGHTS: &'static [Sight] = &[sight::AHEAD];
 
     #[inline(always)]
-    fn observe_body<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
-        AntV0.observe(s, out);
+    fn observe_body<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
+        self.observe(s, out);
     }
 }

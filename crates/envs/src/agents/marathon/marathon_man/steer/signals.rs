@@ -23,44 +23,27 @@ impl Steer {
         hypot(x, y)
     }
 
-    /// Weighted mean squared errors of the joint angles, rad^2, and the joint velocities, rad^2/s^2, against the gait.
-    /// The weights are DeepMimic's.
+    /// Size of the command.
     #[inline(always)]
-    pub(super) fn out_of_step<T: Real>(s: &Senses<T>) -> [T; 2] {
-        let (gaits, r) = (gaits(), s.readings());
-        let [phase, pace] = [PHASE, PACE].map(|slot| s.memory(slot));
-        // a lead shifts angles by velocity times lead, so a lead of 1 s yields the velocity
-        let (now, led) = (gaits.moment(phase, pace, 0.0), gaits.moment(phase, pace, 1.0));
-        let (mut sums, mut total) = ([T::zero(); 2], 0.0);
-        for (i, joint) in JOINTS.iter().enumerate() {
-            let angle = gaits.angle(&now, i);
-            let off = [r.qpos(FIRST_QPOS + i) - angle, r.qvel(FIRST_QPOS - 1 + i) - (gaits.angle(&led, i) - angle)];
-            for (sum, off) in sums.iter_mut().zip(off) {
-                *sum = (off * off).mul_add(T::lit(joint.weight), *sum);
-            }
-            total += joint.weight;
-        }
-        sums.map(|sum| sum * T::lit(1.0 / total))
+    pub(in super::super) fn told<T: Real>(s: &Senses<T>) -> T {
+        s.command(0).abs() + s.command(1).abs()
     }
 
-    /// The gait's phase after `dt` seconds.
+    /// Distance between the center of mass's velocity along the ground and another velocity, m/s.
     #[inline(always)]
-    pub(super) fn next_phase<T: Real>(phase: T, cadence: T, dt: f64) -> T {
-        let next = gaits().frequency(cadence).mul_add(T::lit(dt), phase);
-        next - next.floor()
+    pub(in super::super) fn slip<T: Real>(s: &Senses<T>, [x, y]: [T; 2]) -> T {
+        let [vx, vy, _] = s.center_of_mass_velocity();
+        hypot(vx - x, vy - y)
     }
+}
 
+impl Guide {
     /// Advances the commanded direction, the target velocity and the gait by one decision. The command is a velocity
     /// ahead and to the left, and a turn rate.
     #[inline(always)]
-    pub(in super::super) fn lead<T: Real>(
-        s: &Senses<T>,
-        memory: &mut [T],
-        [told, left]: [T; 2],
-        turn: T,
-        limits: PaceLimits,
-    ) {
-        let speed = Self::speed(s);
+    pub(in super::super) fn lead<T: Real>(&self, s: &Senses<T>, memory: &mut [T], [told, left]: [T; 2], turn: T) {
+        let limits = self.limits;
+        let speed = Steer::speed(s);
         // limit the turn rate to what a body of this speed can follow
         let sharpest = T::lit(MAX_HEADING_ACCELERATION).div(speed.max(T::lit(MAX_HEADING_ACCELERATION / MAX_TURN)));
         let led = turn.max(-sharpest).min(sharpest);
@@ -68,7 +51,7 @@ impl Steer {
         let direction = [memory[DIRECTION], memory[DIRECTION + 1]];
         let direction = heading::turned(s.heading(BUTT), direction, by, MAX_HEADING_LAG);
         memory[DIRECTION..DIRECTION + 2].copy_from_slice(&direction);
-        memory[PHASE] = Self::next_phase(memory[PHASE], limits.cadence(|slot| memory[slot]), s.dt());
+        memory[PHASE] = self.next_phase(memory[PHASE], self.cadence(|slot| memory[slot]), s.dt());
         memory[DECISIONS] += T::lit(1.0);
         // limit the target's acceleration, and its speed in sharp turns
         let [acceleration, deceleration] = [limits.acceleration, limits.deceleration].map(|rate| T::lit(rate * s.dt()));
@@ -95,42 +78,70 @@ impl Steer {
         let pace = hypot(memory[TARGET], memory[TARGET + 1]).max(turning).max(least);
         let pace = speed + clamp(pace - speed, -limits.max_lead, limits.max_lead);
         memory[PACE] += (pace - memory[PACE]).max(-deceleration).min(acceleration);
+        if let Some(footwork) = limits.footwork {
+            let [left, forward] = heading::beside(s.heading(BUTT), [memory[TARGET], memory[TARGET + 1]]);
+            // a body that still moves needs its strides in order to slow down
+            let [_, moves] = heading::beside(s.heading(BUTT), [x, y]);
+            memory[footwork] = clamp(forward.max(moves).div(memory[PACE].max(T::lit(0.1))), 0.0, 1.0);
+            memory[footwork + 1] = left;
+            let most = MAX_TWIST_RATE * s.dt();
+            memory[footwork + 2] += clamp(led - memory[footwork + 2], -most, most);
+        }
     }
 
-    /// Adds the reward's terms. `moves` masks the lanes of `velocity` and `pace`, `holds` those of `drift`, and `goes`
-    /// those of all other terms. `told` is the size of the command, 0 for standing.
+    /// The gait's phase after `dt` seconds.
     #[inline(always)]
-    pub(in super::super) fn add_terms<T: Real>(
-        s: &Senses<T>,
-        [moves, holds, goes]: [T::Mask; 3],
-        told: T,
-        terms: &mut Terms<T>,
-    ) {
-        let slip = Self::slip(s, [s.memory(TARGET), s.memory(TARGET + 1)]);
-        let angle = Self::off(s, Self::direction(s));
-        let [pose, tempo] = Self::out_of_step(s);
-        let mut add = |name, weight, counts, x: T| terms.add(name, weight, T::masked(counts, x.exp()));
-        add("velocity", 0.3, moves, slip * slip * T::lit(-5.0));
-        add("pace", 0.2, moves, slip * slip * T::lit(-0.5));
-        add("drift", 0.05, holds, slip * slip * T::lit(-100.0));
-        add("heading", 0.2, goes, angle * angle * T::lit(-4.0));
-        add("gait", 0.2, goes, pose * T::lit(-5.0));
-        add("tempo", 0.05, goes, tempo * T::lit(-1.0));
-        let rest = T::and(goes, told.lt(T::lit(0.01)));
-        let [shuffles, stirs] = stillness(s, PARTS.len(), STILLNESS_SCALES);
-        terms.add("still", 0.3, T::masked(rest, shuffles + stirs));
+    pub(super) fn next_phase<T: Real>(&self, phase: T, cadence: T, dt: f64) -> T {
+        let next = self.gaits.frequency(cadence).mul_add(T::lit(dt), phase);
+        next - next.floor()
+    }
+
+    /// Angles of the gait's next pose, shifted by `lead` seconds at their velocities.
+    #[inline(always)]
+    pub(in super::super) fn next_pose<T: Real>(
+        &self,
+        memory: impl Fn(usize) -> T,
+        dt: f64,
+        lead: f64,
+    ) -> impl Fn(usize) -> T {
+        let gaits = &*self.gaits;
+        let (phase, pace) = (memory(PHASE), memory(PACE));
+        let next = self.next_phase(phase, self.cadence(&memory), dt);
+        let next = gaits.moment(next, pace, self.footwork(memory), lead);
+        move |joint| gaits.angle(&next, joint)
+    }
+
+    /// Weighted mean squared errors of the joint angles, rad^2, and the joint velocities, rad^2/s^2, against the gait.
+    /// The weights are DeepMimic's.
+    #[inline(always)]
+    pub(super) fn out_of_step<T: Real>(&self, s: &Senses<T>) -> [T; 2] {
+        let (gaits, r) = (&*self.gaits, s.readings());
+        let [phase, pace] = [PHASE, PACE].map(|slot| s.memory(slot));
+        // a lead shifts angles by velocity times lead, so a lead of 1 s yields the velocity
+        let footwork = self.footwork(|slot| s.memory(slot));
+        let [now, led] = [0.0, 1.0].map(|lead| gaits.moment(phase, pace, footwork, lead));
+        let (mut sums, mut total) = ([T::zero(); 2], 0.0);
+        for (i, joint) in JOINTS.iter().enumerate() {
+            let angle = gaits.angle(&now, i);
+            let off = [r.qpos(FIRST_QPOS + i) - angle, r.qvel(FIRST_QPOS - 1 + i) - (gaits.angle(&led, i) - angle)];
+            for (sum, off) in sums.iter_mut().zip(off) {
+                *sum = (off * off).mul_add(T::lit(joint.weight), *sum);
+            }
+            total += joint.weight;
+        }
+        sums.map(|sum| sum * T::lit(1.0 / total))
     }
 
     /// Writes the observation of the command, the body and the reference signals. Vectors are expressed in the
     /// direction `facing`. `told` is the commanded speed and turn rate. `next` maps a hinge and its next angle in the
-    /// gait to the angle to observe. `limits` holds the limits of the reference signals.
+    /// gait to the angle to observe.
     #[inline(always)]
     pub(in super::super) fn observe_going<T: Real>(
+        &self,
         s: &Senses<T>,
         facing: [T; 2],
         told: [T; 2],
         next: impl Fn(usize, T) -> T,
-        limits: PaceLimits,
         out: &mut Obs<T>,
     ) {
         let turned = turned_to(facing);
@@ -138,7 +149,7 @@ impl Steer {
         for x in told {
             out.scalar(x);
         }
-        for x in heading::beside(facing, Self::direction(s)) {
+        for x in heading::beside(facing, Steer::direction(s)) {
             out.scalar(x);
         }
         let [x, y, _] = turned([s.memory(TARGET), s.memory(TARGET + 1), T::zero()]);
@@ -156,44 +167,42 @@ impl Steer {
         for x in [pace, cos, sin] {
             out.scalar(x);
         }
-        let gait = Self::next_pose(|slot| s.memory(slot), limits, s.dt(), 0.0);
+        let gait = self.next_pose(|slot| s.memory(slot), s.dt(), 0.0);
         out.group("next_pose");
         for i in 0..JOINTS.len() {
             out.scalar(next(i, gait(i)) - s.readings().qpos(FIRST_QPOS + i));
         }
     }
 
-    /// Size of the command.
-    #[inline(always)]
-    pub(in super::super) fn told<T: Real>(s: &Senses<T>) -> T {
-        s.command(0).abs() + s.command(1).abs()
-    }
-
     /// Writes the observation of a character that follows the gait alone. Vectors are expressed in its heading.
     #[inline(always)]
-    pub(in super::super) fn observe_along<T: Real>(s: &Senses<T>, out: &mut Obs<T>) {
+    pub(in super::super) fn observe_along<T: Real>(&self, s: &Senses<T>, out: &mut Obs<T>) {
         let told = [s.command(0), s.command(1)];
-        Self::observe_going(s, s.heading(BUTT), told, |_, of_gait| of_gait, PACE_LIMITS, out);
+        self.observe_going(s, s.heading(BUTT), told, |_, of_gait| of_gait, out);
     }
 
-    /// Angles of the gait's next pose, shifted by `lead` seconds at their velocities.
+    /// Adds the reward's terms. `moves` masks the lanes of `velocity` and `pace`, `holds` those of `drift`, and `goes`
+    /// those of all other terms. `told` is the size of the command, 0 for standing.
     #[inline(always)]
-    pub(in super::super) fn next_pose<T: Real>(
-        memory: impl Fn(usize) -> T,
-        limits: PaceLimits,
-        dt: f64,
-        lead: f64,
-    ) -> impl Fn(usize) -> T {
-        let gaits = gaits();
-        let (phase, pace) = (memory(PHASE), memory(PACE));
-        let next = gaits.moment(Self::next_phase(phase, limits.cadence(memory), dt), pace, lead);
-        move |joint| gaits.angle(&next, joint)
-    }
-
-    /// Distance between the center of mass's velocity along the ground and another velocity, m/s.
-    #[inline(always)]
-    pub(in super::super) fn slip<T: Real>(s: &Senses<T>, [x, y]: [T; 2]) -> T {
-        let [vx, vy, _] = s.center_of_mass_velocity();
-        hypot(vx - x, vy - y)
+    pub(in super::super) fn add_terms<T: Real>(
+        &self,
+        s: &Senses<T>,
+        [moves, holds, goes]: [T::Mask; 3],
+        told: T,
+        terms: &mut Terms<T>,
+    ) {
+        let slip = Steer::slip(s, [s.memory(TARGET), s.memory(TARGET + 1)]);
+        let angle = Steer::off(s, Steer::direction(s));
+        let [pose, tempo] = self.out_of_step(s);
+        let mut add = |name, weight, counts, x: T| terms.add(name, weight, T::masked(counts, x.exp()));
+        add("velocity", 0.3, moves, slip * slip * T::lit(-5.0));
+        add("pace", 0.2, moves, slip * slip * T::lit(-0.5));
+        add("drift", 0.05, holds, slip * slip * T::lit(-100.0));
+        add("heading", 0.2, goes, angle * angle * T::lit(-4.0));
+        add("gait", 0.2, goes, pose * T::lit(-5.0));
+        add("tempo", 0.05, goes, tempo * T::lit(-1.0));
+        let rest = T::and(goes, told.lt(T::lit(0.01)));
+        let [shuffles, stirs] = stillness(s, PARTS.len(), STILLNESS_SCALES);
+        terms.add("still", 0.3, T::masked(rest, shuffles + stirs));
     }
 }
