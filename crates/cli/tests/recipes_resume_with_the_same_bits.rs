@@ -212,7 +212,7 @@ fn options_that_do_not_go_with_stages_are_refused() {
 
     // the stages of a task's recipe
     let list = succeed(path, &["train", "MarathonManController", "--list-stages"]);
-    assert!(list.contains(" 9 of 12  skills: distill MarathonManController-v0, waiting"), "{list}");
+    assert!(list.contains(" 9 of 16  skills: distill MarathonManController-v0, waiting"), "{list}");
     assert!(
         list.contains(
             "--option commands=sharp --option gait_max_target=1 --option max_target=3 --option start=adaptive"

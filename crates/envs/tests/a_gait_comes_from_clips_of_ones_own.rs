@@ -33,7 +33,7 @@ fn env(id: &str, given: &Options) -> Result<VecEnv, String> {
     VecEnv::new(id, &options).map_err(|error| error.to_string())
 }
 
-/// Observations of agents that are told to walk.
+/// Observations of agents under a command to walk.
 fn walked(id: &str, given: &Options) -> Vec<Vec<f32>> {
     let mut env = env(id, given).unwrap();
     let (mut out, zeros) = (env.buffers(), vec![0.0; AGENTS * env.spec().act]);

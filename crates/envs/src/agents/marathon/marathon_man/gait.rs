@@ -7,8 +7,8 @@
 //! valid gait in between. The stride length is interpolated too, and speed divided by stride length gives the cycle
 //! frequency. Below walking speed, the amplitudes of the walk shrink toward the standing pose.
 //!
-//! No clip steps aside or turns on the spot. [`Footwork`] edits the gait for that: shorter strides turn a walk into a
-//! march on the spot, and hips that swing sideways or twist keep the standing foot in place while the pelvis moves.
+//! No clip steps aside or turns on the spot, so [`Footwork`] edits the gait. Shorter strides turn a walk into a march on
+//! the spot. Hips that swing sideways or twist keep the standing foot in place while the pelvis moves.
 
 use std::f64::consts::TAU;
 use std::sync::{Arc, LazyLock};
