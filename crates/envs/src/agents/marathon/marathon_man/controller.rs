@@ -44,8 +44,8 @@ use crate::episode_rng::EpisodeRng;
 
 /// Highest commanded speed to a side, m/s.
 const ASIDE: f64 = 0.8;
-/// Rates and limits of the reference signals. They are higher than in the steered task, except for slowing down: a run
-/// that ends abruptly makes the character fall.
+/// Rates and limits of the reference signals. They are higher than in the steered task, but for the deceleration: a run that
+/// ends abruptly makes the character fall.
 const PACE_LIMITS: PaceLimits = PaceLimits {
     acceleration: 7.0,
     deceleration: 4.0,
