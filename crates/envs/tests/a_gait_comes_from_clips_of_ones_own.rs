@@ -4,7 +4,6 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use crate::common::options;
 use marathon_envs::agents::marathon::marathon_man::clips;
 use marathon_envs::agents::marathon::marathon_man::gait::{Footwork, Gaits, gaits};
 use marathon_envs::{Clips, NamedClip, Options, VecEnv, VecEnvOptions};
@@ -27,8 +26,7 @@ fn retimed(name: &str, rate: f64) -> Clip {
 }
 
 fn env(id: &str, given: &Options) -> Result<VecEnv, String> {
-    let own = options(&[("start", "first")]);
-    let given = own.iter().fold(given.clone(), |all, (name, value)| all.with(name, value.clone()));
+    let given = given.clone().with("start", "first");
     let options = VecEnvOptions { agents: AGENTS, seed: 3, options: given, ..VecEnvOptions::default() };
     VecEnv::new(id, &options).map_err(|error| error.to_string())
 }
@@ -59,12 +57,11 @@ fn a_given_clip_replaces_the_shipped_one() {
     let (walk, run) = (retimed("walk", 1.3), clips::shipped("run").unwrap());
     let mine = Gaits::of(&walk, &run).unwrap();
     assert!(mine.frequency(0.8) > 1.2 * gaits().frequency(0.8));
-    let n = env(STEER, &Options::new()).unwrap().spec().obs;
-    let dt = env(STEER, &Options::new()).unwrap().spec().dt;
+    let spec = env(STEER, &Options::new()).unwrap().spec().clone();
     for obs in walked(STEER, &Options::new().with("walk", NamedClip::from(walk))) {
-        for row in obs.chunks_exact(n) {
+        for row in obs.chunks_exact(spec.obs) {
             let at = |i: usize| f64::from(row[i]);
-            let phase = at(GAIT + 2).atan2(at(GAIT + 1)) / TAU + mine.frequency(at(GAIT)) * dt;
+            let phase = at(GAIT + 2).atan2(at(GAIT + 1)) / TAU + mine.frequency(at(GAIT)) * spec.dt;
             let next = mine.moment(phase, at(GAIT), Footwork::straight(), 0.0);
             for joint in 0..21 {
                 let (got, expected) = (at(NEXT + joint) + at(ANGLES + joint), mine.angle(&next, joint));
@@ -82,6 +79,7 @@ fn clips_that_are_no_gaits_are_refused() {
     let cases = [
         (named("walk", "wakl"), "option walk is 'wakl', expected a clip that is known; did you mean 'walk'?"),
         (named("walk", "walk,run"), "option walk has 2 clips, expected one"),
+        (named("run", "all"), "option run has 16 clips, expected one"),
         (named("run", "kick"), "option run is 'kick', a clip that ends, expected one that loops"),
         (named("walk", "stand"), "option walk is 'stand', a clip of 0.08 m/s, expected at least 0.2 m/s"),
         (named("walk", "run"), "expected a run that is faster than the walk"),

@@ -88,25 +88,23 @@ pub fn find(option: &Clips) -> Vec<Arc<Clip>> {
     each(option).into_iter().filter_map(find).collect()
 }
 
-/// Whether an option has clips of these names, and no others but given ones, where they are allowed.
+/// Whether the option `name` has clips of these names, and no others but given ones, where they are allowed.
 ///
 /// # Errors
 /// If one is missing; the text names the nearest.
-pub fn check(option: &Clips, known: &[&str], allow_given: bool) -> Result<(), String> {
+pub fn check(name: &str, option: &Clips, known: &[&str], allow_given: bool) -> Result<(), String> {
     let count = option.iter().count();
     if count > Clips::MOST {
-        return Err(format!("option clip has {count} clips, expected at most {}", Clips::MOST));
+        return Err(format!("option {name} has {count} clips, expected at most {}", Clips::MOST));
     }
     let is_known = |clip: &&NamedClip| known.contains(&clip.name()) || (allow_given && clip.clip().is_some());
     match option.iter().find(|clip| !is_known(clip)) {
-        Some(missing) if !is_all(option) => Err(unknown("clip", missing.name(), known)),
+        Some(missing) if !is_all(option) => {
+            let (clip, hint) = (missing.name(), among(missing.name(), known));
+            Err(format!("option {name} is '{clip}', expected a clip that is known{hint}"))
+        }
         _ => Ok(()),
     }
-}
-
-/// The error that an option names a clip that is not among the known ones.
-pub fn unknown(option: &str, name: &str, known: &[&str]) -> String {
-    format!("option {option} is '{name}', expected a clip that is known{}", among(name, known))
 }
 
 #[cfg(test)]
@@ -115,7 +113,7 @@ mod tests {
 
     #[test]
     fn a_task_has_a_bounded_number_of_clips() {
-        let named = |count: usize| check(&Clips::named(&vec!["walk"; count].join(",")), &names(), true);
+        let named = |count: usize| check("clip", &Clips::named(&vec!["walk"; count].join(",")), &names(), true);
         assert_eq!(named(Clips::MOST), Ok(()));
         assert_eq!(named(Clips::MOST + 1), Err("option clip has 1001 clips, expected at most 1000".into()));
     }

@@ -230,7 +230,7 @@ impl Agent for Controller {
     }
 
     fn fits(&self, model: &Model) -> Result<(), String> {
-        clips::check(&self.arguments.clip, &known_clips(), false)?;
+        clips::check("clip", &self.arguments.clip, &known_clips(), false)?;
         self.steer.fits(model)
     }
 

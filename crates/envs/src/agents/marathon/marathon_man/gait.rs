@@ -185,8 +185,9 @@ impl Gaits {
     /// # Errors
     /// If a clip does not loop or move on, or the run is not faster than the walk.
     pub fn of(walk: &Clip, run: &Clip) -> Result<Self, String> {
-        let mut pose = vec![0.0; shipped(STAND).layout().nq()];
-        shipped(STAND).qpos(0.0, &mut pose);
+        let standing = shipped(STAND);
+        let mut pose = vec![0.0; standing.layout().nq()];
+        standing.qpos(0.0, &mut pose);
         let stand = std::array::from_fn(|i| pose[FIRST_QPOS + i]);
         let [walk, run] = [(walk, "walk"), (run, "run")].map(|(clip, name)| {
             Stride::of(clip).map_err(|error| format!("option {name} is '{}', {error}", clip.about().name))

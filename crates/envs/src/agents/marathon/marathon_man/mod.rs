@@ -203,7 +203,7 @@ impl Agent for MarathonMan {
     }
 
     fn fits(&self, model: &Model) -> Result<(), String> {
-        clips::check(&self.arguments.clip, &clips::names(), true)?;
+        clips::check("clip", &self.arguments.clip, &clips::names(), true)?;
         let most = FUTURE.len();
         if self.arguments.future > most {
             return Err(format!("option future is {}, expected 0 to {most}", self.arguments.future));

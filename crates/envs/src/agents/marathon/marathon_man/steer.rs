@@ -19,7 +19,7 @@
 //!
 //! # Mechanism
 //!
-//! A command passes through three reference signals, updated once per decision by `Steer::lead`:
+//! A command passes through three reference signals, updated once per decision by `Guide::lead`:
 //!
 //! 1. The *commanded direction* turns at the commanded rate. It stays within [`MAX_HEADING_LAG`] of the heading, so it
 //!    waits for a character that cannot follow.
@@ -275,8 +275,6 @@ fn fitting_clip(command: &[f64]) -> usize {
 pub struct Steer {
     pub(super) arguments: SteerArguments,
     pub(super) guide: Guide,
-    /// Why the arguments' clips are no gaits, if so.
-    pub(super) unfit: Option<String>,
     pub(super) fall_replay: FallReplay,
 }
 
@@ -289,10 +287,8 @@ impl Default for Steer {
 impl Steer {
     /// `relived`: the first memory slot of the replayed falls.
     pub(super) fn of(arguments: SteerArguments, limits: PaceLimits, relived: usize) -> Self {
-        let (gaits, unfit) = match Self::gaits(&arguments) {
-            Ok(gaits) => (gaits, None),
-            Err(error) => (gaits().clone(), Some(error)),
-        };
+        // `fits` reports clips that are no gaits
+        let gaits = Self::gaits(&arguments).unwrap_or_else(|_| gaits().clone());
         let fall_replay = FallReplay {
             slot: relived,
             share: arguments.replay_falls_prob.0,
@@ -300,7 +296,7 @@ impl Steer {
             places: 2,
             also: Some(PHASE),
         };
-        Steer { arguments, guide: Guide { limits, gaits }, unfit, fall_replay }
+        Steer { arguments, guide: Guide { limits, gaits }, fall_replay }
     }
 
     /// The gaits of the arguments' clips.
@@ -310,11 +306,10 @@ impl Steer {
             return Ok(gaits().clone());
         }
         let [walk, run] = [("walk", &arguments.walk), ("run", &arguments.run)].map(|(option, clips)| {
-            let found = clips::find(clips);
-            match (&found[..], clips.iter().count()) {
-                ([clip], 1) => Ok(clip.clone()),
-                ([], 1) => Err(clips::unknown(option, &clips.to_string(), &clips::names())),
-                (_, count) => Err(format!("option {option} has {count} clips, expected one")),
+            clips::check(option, clips, &clips::names(), true)?;
+            match &clips::find(clips)[..] {
+                [clip] => Ok(clip.clone()),
+                found => Err(format!("option {option} has {} clips, expected one", found.len())),
             }
         });
         Ok(Gaits::of(&*walk?, &*run?)?.into())
@@ -360,10 +355,8 @@ impl Agent for Steer {
         for clip in clips::find(&self.arguments.walk).into_iter().chain(clips::find(&self.arguments.run)) {
             clip.check_model(Path::new(&clip.about().name), model).map_err(|error| error.to_string())?;
         }
-        match &self.unfit {
-            Some(error) => Err(error.clone()),
-            None => super::has_joints(model),
-        }
+        Self::gaits(&self.arguments)?;
+        super::has_joints(model)
     }
 
     fn reset(&self, start: &mut Start) {
